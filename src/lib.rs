@@ -36,7 +36,7 @@
 //!
 //! | layer | what it holds | may use |
 //! |---|---|---|
-//! | [`error`], [`units`], [`statistics`] | errors by reader, units of stored columns, quantiles; all may use them | - |
+//! | [`error`], [`units`], [`figures`], [`statistics`] | errors by reader, units of stored columns, digits by standard deviations, quantiles; all may use them | - |
 //! | [`description`] | the robot as plain data | - |
 //! | `shell` | words for a shell, in scripts and in commands that are proposed | - |
 //! | `text` | lines for a terminal as templates | - |
@@ -102,12 +102,16 @@
 //! # Adding things
 //! | add | new | touch |
 //! |---|---|---|
-//! | effect | a row of [`effect::CAUSES`] in `src/numerics/effect/table.rs`; what no row follows yet is a variant of `Follows` in `law_row.rs` | its short sentence in `src/summary/text/phrases.txt`, the German of the long one in `src/report/language/de_stored.po`; then `CALIB_UPDATE=1 cargo test --test it forms pages language` |
+//! | effect | a row of [`effect::CAUSES`] in `src/numerics/effect/table.rs`; what no row follows yet is a variant of `Follows` in `law_row.rs`, whose `laws` propose it and whose `is` knows it again | its short sentence in `src/summary/text/phrases.txt`, the German of the long one in `src/report/language/de_stored.po`; then `CALIB_UPDATE=1 cargo test --test it forms pages language` |
+//! | shape of a law | a variant of [`effect::Basis`] in `src/numerics/effect/basis.rs`: how many functions, their values, what they may be off beyond the data | the `Follows` that proposes it; `near` of `law_row.rs` where a shape number is searched |
+//! | cause of torques | a `TorqueCause` in `src/numerics/dynamics/cause/<kind>.rs`: columns, sentence, what it follows | a line in `TORQUE_CAUSES` of `cause/mod.rs`; its short sentence and German as of an effect |
+//! | cause of drives | a row of `causes!` in `src/numerics/drives/causes.rs`, its cells in `cells` there | a variant of `Key` in `key.rs`: what it changes of the roll-out; sentences as of an effect |
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose`, or `diagnose_torques` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
 //! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
-//! | kind of raw file | `src/raw/<name>.rs`, which hands out records, the header first | its `mod` in `src/raw/lib.rs`; in `src/stage/ingest/reading.rs` a variant of `FileKind`, how a file is known to be one (`of`, the first that fits), and a line in `records`; `init` follows |
+//! | kind of raw file | `src/raw/<name>.rs`, which hands out records, the header first | its `mod` and `pub use` in `src/raw/lib.rs`; in `src/stage/ingest/reading.rs` a variant of `FileKind`, how a file is known to be one (`of`, the first that fits), and a line in `records`; `init` follows |
 //! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
+//! | setting of a stage | a field of its settings with `#[serde(default)]` and a doc line, which is its help in editors and on the page of stages; what it may be in `faults` | its use in `run`; a new stage number in `stage!` where tables of old settings change; then `CALIB_UPDATE=1 cargo test --test it pages schemas` |
 //! | stage | `src/stage/<name>.rs`, declared with its ports by `stage!` | one line in [`stage::STAGES`] |
 //! | table | `schemas/<kind>.json`, of which its rows are made; `src/table/<kind>.rs` for what fills them | one line in `tables!` of `src/table/lib.rs` |
 //! | export format | `src/export/<name>.rs`, which declares an `export::Format`; the file begins with `Export::head`, by which `check-export` knows it | its `mod` and one line in `FORMATS`, both in `src/export/mod.rs` |
@@ -118,6 +122,9 @@
 //! | pipeline | `pipelines/<name>/pipeline.yaml` | - |
 //!
 //! An effect step by step, with a row of the table that a test compiles and fits: `src/numerics/effect/README.md`.
+//!
+//! Where a test goes: beside the code what needs one file alone; in `tests/it/<topic>.rs` what a user sees by the command or the library
+//! (`forms` of causes of points, `torques`, `drives`, `ingest` of files, `pages` of what is generated, `cmd` of a verb's words).
 //!
 //! House rules: files are cohesive, 100 to 600 lines; rustfmt's defaults; names of types once. Verbs
 //! are functions, nouns are data; models are immutable; `f64`, ordered maps. Doc lines say what, shapes, units, failure; comments say why.
@@ -165,7 +172,7 @@ pub use calib_diagnose as diagnose;
 pub use calib_drives as drives;
 pub use calib_dynamics as dynamics;
 pub use calib_engine as engine;
-pub use calib_foundation::{description, error, statistics, units};
+pub use calib_foundation::{description, error, figures, statistics, units};
 pub use calib_numerics::{
     compensate, criteria, effect, estimate, observation, robot, spatial, yaml,
 };

@@ -274,7 +274,11 @@ impl Observer for Progress {
                     state.unit
                 )
             }
-            _ => format!("  {text}, {done} {}{}", state.unit, left(state.over)),
+            _ => {
+                let spent = state.begun.elapsed().as_secs();
+                let left = left(state.over);
+                format!("  {text}, {done} {}, {spent} s so far{left}", state.unit)
+            }
         };
         drop(state);
         self.line(id, &line);

@@ -1,6 +1,7 @@
 //! Lines for a terminal as templates, filled with what `--json` prints.
 
 use crate::error::{counted, visible};
+use crate::figures::{deviation, measured};
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Value, ValueKind};
 use minijinja::{Environment, UndefinedBehavior};
@@ -34,6 +35,12 @@ pub(crate) fn filled(template: &'static str, about: minijinja::Value) -> String 
     });
     environment.add_filter("figure", |value: Option<f64>| {
         value.map_or_else(|| "-".into(), |value| format!("{value:.3}"))
+    });
+    environment.add_filter("measured", |value: f64, sigma: Option<f64>| {
+        measured(value, sigma)
+    });
+    environment.add_filter("deviation", |sigma: f64, value: f64| {
+        deviation(sigma, value)
     });
     environment.add_filter("columns", columns);
     environment.add_filter("brief", brief);

@@ -230,6 +230,7 @@ fn closing(arguments: &InitArguments, start: &StarterFiles, files: &[PathBuf; 2]
         |(path, account): &(PathBuf, String)| (path.display().to_string(), account.clone());
     let first = match (&start.robot, arguments.robot, &arguments.urdf) {
         (None, ..) => "see that it is the robot of these recordings",
+        (Some(text), ..) if !text.contains("REPLACE") => "see that it is your robot",
         (_, Some(arm), _) if typical(arm.name).is_none() => {
             "the arm's own numbers; put the measured point where it says REPLACE"
         }

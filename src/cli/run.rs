@@ -342,7 +342,7 @@ fn fitted(arguments: &CheckArguments, plan: Plan, command_line: &[OsString]) -> 
         let file = arguments.pipeline.display().to_string();
         return Err(Error::spec(
             file,
-            "has no stage `identify`, and --data fits base and geometry; leave --data out",
+            "has no stage `identify`: --data fits base and geometry of points; rows of torques and of drives are checked when the pipeline runs",
         ));
     }
     let plan = plan.needed_for_all(&fits);

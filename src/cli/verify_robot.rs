@@ -1,6 +1,6 @@
 //! `calib verify-robot`: what compensation achieved, from points that were measured at corrected targets.
 
-use super::pipeline_arguments::ModelArguments;
+use super::pipeline_arguments::{ModelArguments, language_parser};
 use super::{emit_json, emit_lines, readable, write};
 use crate::api::usual_options;
 use crate::compensate::{CorrectionOptions, Corrector};
@@ -8,7 +8,7 @@ use crate::error::{Error, Result, counted};
 use crate::identified::{Achieved, achieved};
 use crate::pipeline::Purpose;
 use crate::raw;
-use crate::report::{AchievedTables, achieved_page};
+use crate::report::{AchievedTables, PageLanguage, achieved_page};
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
 use crate::summary::labelled;
 use crate::targets::{Layout, Units, measured};
@@ -27,6 +27,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   calib verify-robot cell7/pipeline.yaml second.csv
   calib verify-robot cell7/pipeline.yaml second.csv --html verified.html
+  calib verify-robot cell7/pipeline.yaml second.csv --html nachweis.html --language de
   calib verify-robot latest second.csv --new-base --json")]
 pub(super) struct VerifyRobotArguments {
     #[command(flatten)]
@@ -43,6 +44,9 @@ pub(super) struct VerifyRobotArguments {
     /// Writes the figures and their picture as one HTML page, too
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Language of that page
+    #[arg(long, value_name = "LANGUAGE", default_value = "en", requires = "html", value_parser = language_parser())]
+    language: PageLanguage,
     /// Prints one JSON document on stdout
     #[arg(long)]
     json: bool,
@@ -84,7 +88,10 @@ impl VerifyRobotArguments {
         let noise = identified.data.as_ref().map_or(0.0, instrument_noise);
         let found = achieved(&arm, &nominal, &mut corrector, &rows, self.new_base, noise)?;
         if let Some(path) = &self.html {
-            write(path, &page(&identified.origin, &found, self.new_base)?)?;
+            write(
+                path,
+                &page(&identified.origin, &found, self.new_base, self.language)?,
+            )?;
         }
         if self.json {
             return emit_json(&document(&identified.origin, &found));
@@ -141,14 +148,12 @@ fn rows(found: &Achieved, new_base: bool) -> Vec<(&'static str, [f64; 3], String
 }
 
 /// How many points are farther off than predicted; none where nothing was predicted.
-fn beyond(found: &Achieved) -> Option<String> {
+fn beyond(found: &Achieved) -> Option<usize> {
     let pairs = found.achieved.iter().zip(&found.predicted);
     let beyond = pairs
         .filter(|(achieved, predicted)| achieved > predicted)
         .count();
-    let all = found.achieved.len();
-    let line = || format!("{beyond} of {all} points are farther off than predicted");
-    (!found.predicted.is_empty()).then(line)
+    (!found.predicted.is_empty()).then_some(beyond)
 }
 
 /// Targets without a correction; none where all have one.
@@ -158,19 +163,21 @@ fn unreached(found: &Achieved) -> Option<String> {
     (found.unreached > 0).then(line)
 }
 
-fn page(origin: &str, found: &Achieved, new_base: bool) -> Result<String> {
+fn page(origin: &str, found: &Achieved, new_base: bool, language: PageLanguage) -> Result<String> {
     let mm = |lengths: &[f64]| lengths.iter().map(|length| 1e3 * length).collect();
     let poses = found.poses.iter();
     let poses = poses.map(|pose| (pose.cycles, 1e3 * pose.accuracy, 1e3 * pose.repeatability));
-    let remarks = beyond(found).into_iter().chain(unreached(found));
-    achieved_page(&AchievedTables {
-        title: "Before, predicted and achieved",
+    let rows = rows(found, new_base).into_iter();
+    let tables = AchievedTables {
         model: origin,
-        rows: rows(found, new_base),
+        rows: rows.map(|(name, figures, _)| (name, figures)).collect(),
+        new_base,
         errors: [mm(&found.before), mm(&found.achieved)],
         poses: poses.collect(),
-        remarks: remarks.map(|line| format!("{line}.")).collect(),
-    })
+        beyond: beyond(found),
+        unreached: found.unreached,
+    };
+    achieved_page(&tables, language)
 }
 
 fn report_text(origin: &str, found: &Achieved, new_base: bool) -> String {
@@ -179,7 +186,11 @@ fn report_text(origin: &str, found: &Achieved, new_base: bool) -> String {
         let figures = format!("mean {mean:.4} mm, 95 % within {p95:.4} mm, max {max:.4} mm {what}");
         text += &labelled(label, &figures);
     }
-    text.extend(beyond(found).map(|line| labelled("", &line)));
+    text.extend(beyond(found).map(|beyond| {
+        let all = found.achieved.len();
+        let line = format!("{beyond} of {all} points are farther off than predicted");
+        labelled("", &line)
+    }));
     text.extend(unreached(found).map(|line| labelled("warning", &line)));
     for (k, pose) in (1..).zip(&found.poses) {
         let (accuracy, repeatability) = (1e3 * pose.accuracy, 1e3 * pose.repeatability);

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use quick_xml::escape::escape;
 
 /// The remark on [`placeholder_inertia`].
-const PLACEHOLDER: &str = "the inertia is a placeholder: recordings at rest do not show it";
+const PLACEHOLDER: &str = "the inertia is a placeholder: it is neither declared nor identified";
 
 /// The inertia of a ball of 0.1 m, kg m2.
 fn placeholder_inertia(mass: f64) -> f64 {

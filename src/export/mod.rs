@@ -191,10 +191,12 @@ impl Export {
     fn base_said(&self) -> String {
         let base = self.identified.model.base();
         let (place, turn) = body::origin(&Pose::identity(), &base);
+        // Micrometres and microradians: no instrument tells more.
+        let said = |numbers: [f64; 3]| numbers.map(|number| format!("{number:.6}")).join(" ");
         format!(
             "not carried: where the base stands in the measured frame: at {} m, turned by roll, pitch, yaw {} rad",
-            body::numbers(place),
-            body::numbers(turn)
+            said(place),
+            said(turn)
         )
     }
 

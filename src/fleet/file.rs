@@ -79,7 +79,7 @@ impl Groups {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RobotSource {
-    /// One folder a robot, as a pattern relative to this file: `recordings/*`. The folder's name is the robot's.
+    /// One folder a robot, as a pattern, relative to this file or absolute: `recordings/*`. The folder's name is the robot's.
     #[serde(default)]
     pub(crate) folders: Option<String>,
     /// CSV or Parquet with the columns `robot`, and if wanted `folder`, `model`, `plant`, `campaign`, `set.TARGET` (a value as in

@@ -123,7 +123,7 @@ fn folders(folder: &Path, pattern: &str, variable: &str) -> Result<Vec<FleetRobo
             "the folder of this file has a name that is not UTF-8",
         )
     })?;
-    let whole = if base.is_empty() {
+    let whole = if base.is_empty() || Path::new(pattern).is_absolute() {
         pattern.to_string()
     } else {
         format!("{}/{pattern}", glob::Pattern::escape(base))
@@ -155,7 +155,14 @@ fn folders(folder: &Path, pattern: &str, variable: &str) -> Result<Vec<FleetRobo
     if robots.is_empty() {
         return Err(Error::spec(
             "folders",
-            format!("no folder matches `{pattern}` (relative to this file)"),
+            format!(
+                "no folder matches `{pattern}`{}",
+                if Path::new(pattern).is_absolute() {
+                    ""
+                } else {
+                    " (relative to this file)"
+                }
+            ),
         ));
     }
     robots.sort_by(|a, b| a.name.cmp(&b.name));

@@ -47,7 +47,7 @@ impl IdentifiedTorques {
         let model = parameters.to_model()?;
         let mut warnings = Vec::new();
         if !(0..model.joints()).all(|link| model.is_whole(link)) {
-            let warning = "masses are identified as base parameters: no link has masses of its own, and none are exported";
+            let warning = "masses are identified as base parameters: no link has masses of its own, and exported are those of the robot file, where it has some";
             warnings.push(warning.into());
         }
         let bodies = model.consistency().into_iter();

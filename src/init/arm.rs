@@ -174,6 +174,15 @@ const EXPECTED: &str =
 const MODELLED: &str = "what the controller's own model expects: what it lacks is looked for; leave the line out to hold the declared masses against the torques";
 const EFFORT: &str = "drivers of ROS state torques or motor currents as effort";
 
+/// A robot file whose measured point needs no look: no torque depends on it.
+pub(super) fn without_point(text: &str) -> String {
+    let line = |line: &str| match line.split_once("   # REPLACE") {
+        Some((tool, _)) if tool.starts_with("tool:") => tool.to_string(),
+        _ => line.to_string(),
+    };
+    text.lines().map(|one| line(one) + "\n").collect()
+}
+
 /// Whether the recordings are of torques: each has times, joints, and what drives them, and none has points. Then they are mapped as such.
 pub(super) fn of_torques(found: &mut [ExaminedFile]) -> bool {
     let driven = |file: &ExaminedFile, listed| !file.by_joint(listed).is_empty();

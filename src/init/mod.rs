@@ -90,7 +90,10 @@ pub(crate) fn start(request: &InitRequest) -> Result<StarterFiles> {
     let files = found.iter().chain(more.iter().map(|(_, file)| file));
     Ok(StarterFiles {
         robot_file: arm.file.name,
-        robot: arm.text,
+        robot: match of_torques {
+            true => arm.text.map(|text| arm::without_point(&text)),
+            false => arm.text,
+        },
         pipeline,
         accounts: files
             .map(|file| (file.path.clone(), file.account()))

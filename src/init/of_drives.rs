@@ -3,6 +3,7 @@
 
 use super::lerobot::{self, DataSet};
 use super::pipeline::{from_folder, name_of};
+use super::sheet::{self, Sheet, number};
 use crate::drives::mjcf::{self, MjcfArm, MjcfText};
 use crate::error::{Error, Result, listed};
 use crate::raw::{self, ColumnRows, Record, RecordReader};
@@ -23,7 +24,7 @@ pub(crate) struct DriveStart {
     pub(crate) notes: Vec<String>,
 }
 
-const COMMANDED: [&str; 14] = [
+const COMMANDED: [&str; 17] = [
     "cmd",
     "command",
     "commands",
@@ -38,8 +39,11 @@ const COMMANDED: [&str; 14] = [
     "action",
     "actions",
     "control",
+    "soll",
+    "sollwert",
+    "vorgabe",
 ];
-const MEASURED: [&str; 12] = [
+const MEASURED: [&str; 14] = [
     "q",
     "pos",
     "position",
@@ -52,6 +56,8 @@ const MEASURED: [&str; 12] = [
     "state",
     "observation",
     "joint",
+    "ist",
+    "istwert",
 ];
 /// Words of columns that are neither.
 const OTHERS: [&str; 16] = [
@@ -72,7 +78,31 @@ const OTHERS: [&str; 16] = [
     "acc",
     "voltage",
 ];
-const CLOCKS: [&str; 6] = ["time", "timestamp", "t", "stamp", "clock", "timestamps"];
+const CLOCKS: [&str; 7] = [
+    "time",
+    "timestamp",
+    "t",
+    "stamp",
+    "clock",
+    "timestamps",
+    "zeit",
+];
+/// Words of a column that tells trajectories apart.
+const TRAJECTORIES: [&str; 9] = [
+    "traj",
+    "trajectory",
+    "episode",
+    "run",
+    "segment",
+    "trial",
+    "fahrt",
+    "lauf",
+    "bahn",
+];
+/// Rows a trajectory at least: what changes more often is something else.
+const SHORTEST: usize = 20;
+/// What the stage takes without being told.
+const DEFAULT_TRAJECTORY: &str = "traj";
 /// Rows that are looked at.
 const LOOKED_AT: usize = 5_000;
 /// rad beyond which angles are taken to be degrees.
@@ -84,6 +114,8 @@ struct Table {
     label: String,
     head: Vec<String>,
     rows: Vec<Vec<String>>,
+    /// Lines of `text` in the YAML, of what is not written as most texts are.
+    text: Vec<String>,
 }
 
 /// A quantity of all joints: the name in the YAML, and its values row by row.
@@ -105,8 +137,8 @@ fn has(text: &str, list: &[&str]) -> bool {
 impl Table {
     fn read(path: &Path) -> Result<Self> {
         match raw::ending(path).as_str() {
-            "csv" => Self::of_text(path),
-            _ => Self::of_columns(path),
+            "parquet" => Self::of_columns(path),
+            _ => Self::of_text(path),
         }
     }
 
@@ -127,11 +159,17 @@ impl Table {
             label,
             head: lines.next().unwrap_or_default(),
             rows: lines.collect(),
+            text: Vec::new(),
         })
     }
 
     fn of_text(path: &Path) -> Result<Self> {
         let label = path.display().to_string();
+        // A table of lists is none of numbers, and read below.
+        let sheets = sheet::tables(path, 1)?.into_iter();
+        if let Some(sheet) = sheets.last().filter(is_of_numbers) {
+            return Ok(Self::of_sheet(path, label, sheet));
+        }
         let text = raw::text(path).map_err(|error| Error::unreadable(&label, &error))?;
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
@@ -148,7 +186,55 @@ impl Table {
             label,
             head,
             rows,
+            text: Vec::new(),
         })
+    }
+
+    /// A text that is written in a way of its own; its numbers as all others are.
+    fn of_sheet(path: &Path, label: String, sheet: Sheet) -> Self {
+        let mut text = Vec::new();
+        match sheet.delimiter {
+            ',' => (),
+            ' ' => text.push("delimiter: whitespace".into()),
+            '\t' => text.push("delimiter: tab".into()),
+            other => text.push(format!("delimiter: {}", quoted(&other.to_string()))),
+        }
+        if sheet.comma {
+            text.push("decimal: comma".into());
+        }
+        if sheet.skip > 0 {
+            text.push(format!("skip: {}   # lines above the header", sheet.skip));
+        }
+        if sheet.unit_row {
+            text.push("skip_below_header: 1   # a row of units".into());
+        }
+        if let Some(mark) = sheet.comment {
+            text.push(format!("comment: {}", quoted(mark)));
+        }
+        let plain = |cell: String| number(&cell).map_or(cell, |value| value.to_string());
+        let rows = sheet.rows.into_iter().take(LOOKED_AT);
+        Self {
+            path: path.to_path_buf(),
+            label,
+            head: sheet.names,
+            rows: rows
+                .map(|row| row.into_iter().map(plain).collect())
+                .collect(),
+            text,
+        }
+    }
+
+    /// The column that tells trajectories apart, by its name and by how seldom it changes.
+    fn trajectory(&self) -> Option<&String> {
+        let changes = |at: usize| {
+            let pairs = self.rows.windows(2);
+            pairs.filter(|pair| pair[0][at] != pair[1][at]).count()
+        };
+        let named = self.head.iter().enumerate();
+        let mut named = named.filter(|(_, column)| has(column, &TRAJECTORIES));
+        named
+            .find(|(at, _)| changes(*at) * SHORTEST < self.rows.len())
+            .map(|(_, column)| column)
     }
 
     fn numbers(&self, column: usize) -> Option<Vec<f64>> {
@@ -287,12 +373,18 @@ pub(crate) fn chain(
     Ok((arm, all, includes))
 }
 
-/// Files of the recording: CSV or Parquet, of a folder those in it, of a data set its first.
+/// Whether a table of numbers was understood.
+fn is_of_numbers(sheet: &Sheet) -> bool {
+    sheet.trouble.is_none() && sheet.header && !sheet.header_in_comment
+}
+
+/// Files of the recording: texts or Parquet, of a folder those in it, of a data set its first.
 fn tables(data: &[PathBuf], set: Option<&DataSet>) -> Result<Vec<Table>> {
     if let Some(set) = set {
         return Ok(vec![Table::read(&set.first)?]);
     }
-    let is_read = |path: &Path| ["csv", "parquet"].contains(&raw::ending(path).as_str());
+    let is_read =
+        |path: &Path| ["csv", "txt", "tsv", "parquet"].contains(&raw::ending(path).as_str());
     let mut files = Vec::new();
     for path in data {
         if path.is_dir() {
@@ -385,6 +477,7 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
         let message = "has no column of time (time, timestamp, t), whose values rise";
         Error::data(&table.label, message)
     })?;
+    let trajectory = table.trajectory();
     let rate = (1e3 / step).round() / 1e3;
     let rate = if rate > 20.0 { rate.round() } else { rate };
     let rate = set.map_or(rate, |set| set.fps);
@@ -460,6 +553,11 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
         let path = &tables[of_commands].path;
         lines.push(format!("      commands: {}", from_folder(folder, path)));
     }
+    if !table.text.is_empty() {
+        lines.push("      text:".into());
+        let text = table.text.iter();
+        lines.extend(text.map(|line| format!("        {line}")));
+    }
     lines.extend([
         "      columns:".into(),
         format!("        time: {}", quoted(&time)),
@@ -478,10 +576,29 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
     if set.is_some() {
         lines.push(format!("        trajectory: {}", quoted(lerobot::EPISODE)));
         lines.push("      hold_out: {last: 0.25}   # CHECK the end of each episode judges".into());
-    } else if !table.head.iter().any(|column| column == "use") {
+    } else if let Some(column) = trajectory.filter(|column| *column != DEFAULT_TRAJECTORY) {
+        lines.push(format!("        trajectory: {}   # CHECK", quoted(column)));
+    }
+    if set.is_none() && !table.head.iter().any(|column| column == "use") {
         lines.push("        # usage: use   # CHECK a column that says `fit` or `validate`; without it all rows are fitted, and the errors flatter".into());
     }
     lines.push("  - uses: report_drives".into());
+    let known = [Some(&time), trajectory].into_iter().flatten();
+    let known: Vec<&str> = known.map(String::as_str).chain(["use"]).collect();
+    let is_used = |column: &String| {
+        let of_joints = names.iter().enumerate().any(|(k, name)| {
+            [&command, &angle].into_iter().any(|found| {
+                let pattern = found.column.replace("{j}", &(k + 1).to_string());
+                [name.as_str(), short(name)]
+                    .iter()
+                    .any(|name| pattern.replace("{name}", name) == *column)
+            })
+        });
+        of_joints || known.contains(&column.as_str())
+    };
+    let unused: Vec<&str> = (table.head.iter().filter(|column| !is_used(column)))
+        .map(String::as_str)
+        .collect();
     let mut notes = arm.notes.clone();
     if let Some(set) = set {
         notes.push("stamps of a LeRobot data set are the number of the row over fps, not measured: an uneven rate shows as delay and friction".into());
@@ -512,7 +629,14 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
                 "commands {}, angles {} ({unit}), {rate} Hz",
                 command.column, angle.column
             ),
-        ],
+            match trajectory {
+                Some(column) => format!("trajectories by {column}"),
+                None => "one trajectory, but for pauses in the stamps".into(),
+            },
+        ]
+        .into_iter()
+        .chain((!unused.is_empty()).then(|| format!("not used: {}", listed(&unused))))
+        .collect(),
         notes,
     })
 }

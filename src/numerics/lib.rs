@@ -6,7 +6,7 @@
 
 use calib_foundation::{description, statistics, units};
 
-pub use calib_foundation::error;
+pub use calib_foundation::{error, figures};
 
 pub mod criteria;
 pub mod yaml;

@@ -28,6 +28,22 @@ pub fn solve(
     };
     let targets = literals.iter().map(|literal| target(literal, &reader));
     let answers = corrector.batch(targets.collect());
+    let mut reached = |literal: &Literal| {
+        let free = Literal {
+            posture: PostureStatement::Unstated,
+            ..literal.clone()
+        };
+        let answer = corrector.batch(vec![target(&free, &reader)]).pop();
+        let q = answer.and_then(|answer| answer.q);
+        q.map(|q| reader.restated(literal.posture, &q))
+    };
+    // In which posture a target is reached that is not in the stated one.
+    let reached: Vec<Option<PostureStatement>> = (literals.iter().zip(&answers))
+        .map(|(literal, answer)| match is_elsewhere(answer) {
+            true => reached(literal).filter(|posture| *posture != literal.posture),
+            false => None,
+        })
+        .collect();
     let unchecked = |literal: &Literal| reader.unchecked(literal.posture);
     let first = literals.iter().position(is_unstated);
     let first_unchecked = literals
@@ -35,9 +51,10 @@ pub fn solve(
         .position(|literal| unchecked(literal).is_some());
     let solved = |(k, (literal, answer)): (usize, (&Literal, &CorrectedCommand))| {
         let Some(q) = &answer.q else {
-            let is_other = answer.remarks.contains(&Remark::OtherPosture);
-            return Err(match is_other {
-                true => format!("{} ({})", answer.remark(), literal.posture),
+            let reached = reached[k].map(|posture| format!("; it is reached in {posture}"));
+            let reached = reached.unwrap_or_default();
+            return Err(match is_elsewhere(answer) {
+                true => format!("{} ({}){reached}", answer.remark(), literal.posture),
                 false => answer.remark(),
             });
         };
@@ -59,6 +76,11 @@ pub fn solve(
     };
     let answered = literals.iter().zip(&answers).enumerate();
     answered.map(solved).collect()
+}
+
+/// Whether a target has no command in the posture that is stated.
+fn is_elsewhere(answer: &CorrectedCommand) -> bool {
+    answer.q.is_none() && answer.remarks.contains(&Remark::OtherPosture)
 }
 
 /// Once a program, at its first such target.

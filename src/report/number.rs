@@ -3,20 +3,14 @@
 use super::language::Locale;
 use crate::error::{Error, Result};
 use crate::units::{Quantity, Unit};
+use calib_foundation::figures::{deviation, measured};
+pub(super) use calib_foundation::figures::{fixed, significant};
 use minijinja::value::Serde;
 use minijinja::{Environment, UndefinedBehavior};
 use serde_json::Value;
 
 /// Decimals of a length in mm: a laser tracker resolves micrometres.
 const MM: usize = 3;
-
-pub(super) fn fixed(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(tail) if !tail.contains(|c: char| ('1'..='9').contains(&c)) => tail.into(),
-        _ => text,
-    }
-}
 
 pub(super) fn mm(value: f64) -> String {
     fixed(value, MM)
@@ -30,74 +24,6 @@ pub(super) fn signed(value: f64, decimals: usize) -> String {
     } else {
         text
     }
-}
-
-/// To so many significant digits, in powers of ten where that is shorter.
-pub(super) fn significant(value: f64, digits: usize) -> String {
-    if value == 0.0 {
-        return "0".into();
-    }
-    let power = value.abs().log10().floor();
-    if (-3.0..7.0).contains(&power) {
-        fixed(value, (digits as f64 - 1.0 - power).max(0.0) as usize)
-    } else {
-        format!("{value:.*e}", digits.saturating_sub(1))
-    }
-}
-
-/// With the digits that a standard deviation tells, two of that where it begins with 1; four significant ones without.
-pub(super) fn measured(value: f64, sigma: Option<f64>) -> String {
-    let Some(sigma) = sigma.filter(|sigma| *sigma > 0.0 && sigma.is_finite()) else {
-        return significant(value, 4);
-    };
-    rounded(value, sigma, value)
-}
-
-/// A statement whose numbers have no more digits than their standard deviations tell: `numbers` are values with theirs, of which the statement
-/// has some, rounded alike whatever is known of them.
-pub(super) fn with_digits(statement: &str, numbers: &[(f64, Option<f64>)]) -> String {
-    let known = |word: &str| -> Option<String> {
-        let decimals = word.split_once('.')?.1.len();
-        let stated: f64 = word.parse().ok()?;
-        let is_it = |(value, _): &&(f64, Option<f64>)| fixed(value.abs(), decimals) == word;
-        let (value, sigma) = numbers.iter().find(is_it)?;
-        let short = measured(value.abs(), Some((*sigma)?));
-        // Statements of small numbers have all of their digits already.
-        (short.len() < word.len() && !short.contains('e') && stated > 0.0).then_some(short)
-    };
-    let shorter = |word: &str| {
-        let tail = word.trim_start_matches(['(', '+', '-']);
-        let number = tail.trim_end_matches([',', ';', '.', ')', ':']);
-        known(number).map_or_else(|| word.into(), |short| word.replacen(number, &short, 1))
-    };
-    let words: Vec<String> = statement.split(' ').map(shorter).collect();
-    words.join(" ")
-}
-
-/// The standard deviation of a value, written as [`measured`] writes that: both with the same decimals, or both in powers of ten.
-pub(super) fn deviation(sigma: f64, value: f64) -> String {
-    match sigma > 0.0 && sigma.is_finite() {
-        true => rounded(sigma, sigma, value),
-        false => significant(sigma, 4),
-    }
-}
-
-/// A number with the digits that `sigma` tells; whether in powers of ten is decided by `value`.
-fn rounded(number: f64, sigma: f64, value: f64) -> String {
-    let first = sigma.log10().floor();
-    let digits = if sigma / 10f64.powf(first) < 2.0 {
-        2.0
-    } else {
-        1.0
-    };
-    let place = first - digits + 1.0;
-    let size = value.abs().max(sigma);
-    if size.log10().floor() < -3.0 || size >= 1e7 {
-        let kept = (number.abs().max(f64::MIN_POSITIVE).log10().floor() - place).max(0.0);
-        return significant(number, kept as usize + 1);
-    }
-    let unit = 10f64.powf(place);
-    fixed((number / unit).round() * unit, (-place).max(0.0) as usize)
 }
 
 /// The same without trailing zeros, for a number that is to be copied.
@@ -241,18 +167,6 @@ pub(super) fn render(
             of_deviation.decimal(deviation(sigma, value))
         })
     });
-    environment.add_filter(
-        "digits",
-        |statement: &str, numbers: Vec<minijinja::Value>| {
-            let number =
-                |row: &minijinja::Value, name: &str| f64::try_from(row.get_attr(name).ok()?).ok();
-            let numbers = numbers.iter();
-            let numbers: Vec<_> = numbers
-                .filter_map(|row| Some((number(row, "value")?, number(row, "sigma"))))
-                .collect();
-            with_digits(statement, &numbers)
-        },
-    );
     let fixed = move |value: Option<f64>, decimals: usize| {
         value.map_or_else(String::new, |value| of_fixed.fixed(value, decimals))
     };
@@ -314,23 +228,6 @@ mod tests {
         assert_eq!(
             [7, -1234, 10_000_000].map(count),
             ["7", "-1\u{202f}234", "10\u{202f}000\u{202f}000"]
-        );
-    }
-
-    #[test]
-    fn a_statement_has_no_more_digits_than_its_numbers_are_known_to() {
-        let numbers = [(14.7652, Some(0.2)), (-0.2931, Some(0.12)), (19.4, None)];
-        assert_eq!(
-            with_digits(
-                "joint 2 has 14.765 Nm; it begins -0.293 Nm off, over 19.4 s",
-                &numbers
-            ),
-            "joint 2 has 14.8 Nm; it begins -0.29 Nm off, over 19.4 s"
-        );
-        // Digits are taken away, none is made up.
-        assert_eq!(
-            with_digits("is 0.7 mm", &[(0.6864, Some(0.001))]),
-            "is 0.7 mm"
         );
     }
 

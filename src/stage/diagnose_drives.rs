@@ -12,6 +12,7 @@ use crate::drives::{CAUSES, Drives, diagnose};
 use crate::dynamics::InertialTolerance;
 use crate::engine::Options;
 use crate::error::{Error, Fault, Place, Result, did_you_mean, listed};
+use crate::raw::{DecimalMark, Delimiter, TextLayout};
 use crate::table::{
     DriveCourse, DriveSimulation, DriveVerdict, FindingNumbers, Findings, JointDrives, Rivals,
     VerdictSentences,
@@ -45,6 +46,9 @@ pub struct DiagnoseDrives {
     /// The commands of one recording, where they are in a file of their own on the same clock: each holds until the next.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub commands: Option<RawFile>,
+    /// How recordings of text are written; without it commas stand between fields, and a header on the first line.
+    #[serde(default, skip_serializing_if = "DriveText::is_default")]
+    pub text: DriveText,
     /// Columns of the recording.
     #[serde(default)]
     pub columns: DriveColumns,
@@ -144,6 +148,50 @@ impl Default for DriveColumns {
     }
 }
 
+/// How a recording of text is written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DriveText {
+    /// What stands between fields: one ASCII character, `tab`, or `whitespace` (any run of blanks and tabs).
+    pub delimiter: String,
+    /// The decimal mark of the numbers.
+    pub decimal: DecimalMark,
+    /// Lines to skip above the header.
+    pub skip: u64,
+    /// Lines to skip between header and data, e.g. a row of units.
+    pub skip_below_header: u64,
+    /// Lines that begin with this text are skipped, e.g. `#`.
+    pub comment: Option<String>,
+}
+
+impl Default for DriveText {
+    fn default() -> Self {
+        Self {
+            delimiter: ",".into(),
+            decimal: DecimalMark::Point,
+            skip: 0,
+            skip_below_header: 0,
+            comment: None,
+        }
+    }
+}
+
+impl DriveText {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+
+    fn layout(&self) -> Result<TextLayout> {
+        let delimiter = Delimiter::parse(&self.delimiter);
+        Ok(TextLayout {
+            delimiter: delimiter.ok_or_else(|| Error::Bug("an unchecked delimiter".into()))?,
+            comment: self.comment.clone(),
+            header_in_comment: false,
+            skip: self.skip,
+        })
+    }
+}
+
 /// A unit of angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -184,7 +232,7 @@ impl ClockUnit {
 }
 
 crate::stage! {
-    DiagnoseDrives, "diagnose_drives", 8, "names the physics that the simulation of commanded joints lacks, from commands and angles",
+    DiagnoseDrives, "diagnose_drives", 9, "names the physics that the simulation of commanded joints lacks, from commands and angles",
         DiagnoseDrivesReads {} -> DiagnoseDrivesWrites {
             verdict: DriveVerdict,
             sentences: VerdictSentences,
@@ -246,6 +294,10 @@ impl Stage for DiagnoseDrives {
             let message = format!("no cause `{name}`{hint} (causes: {})", listed(&names));
             at.at(format!("without[{k}]")).must(known, message);
         }
+        at.at("text").at("delimiter").must(
+            Delimiter::parse(&self.text.delimiter).is_some(),
+            "allowed: one ASCII character, `tab` or `whitespace`",
+        );
         let one = self.columns.command == self.columns.angle;
         let sources = self.sources();
         let apart = |source: &Source| source.commands.is_some();

@@ -351,7 +351,10 @@ fn note(context: &Context, fitting: &Fitting) {
         .map(|(k, times)| {
             let spec = &model.stack.specs()[k];
             let (value, unit) = (spec.unit.from_si(model.x[k]), spec.unit.symbol());
-            format!("{} {value:+.4} {unit} ({times:.0} times)", spec.name)
+            match unit {
+                "1" => format!("{} {value:+.4} ({times:.0} times)", spec.name),
+                _ => format!("{} {value:+.4} {unit} ({times:.0} times)", spec.name),
+            }
         })
         .collect();
     if !beyond.is_empty() {

@@ -19,7 +19,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 crate::stage! {
-    Report, "report", 31, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
+    Report, "report", 32, "writes one self-contained HTML file: errors before and after, parameters, rejected rows",
         ReportReads -> ReportWrites {
             document: Document,
             acceptance: Acceptance,
@@ -268,7 +268,7 @@ pub struct ReportTorques {
 }
 
 crate::stage! {
-    ReportTorques, "report_torques", 13, "writes one self-contained HTML file: torques before and after, friction, what was found",
+    ReportTorques, "report_torques", 14, "writes one self-contained HTML file: torques before and after, friction, what was found",
         ReportTorquesReads -> ReportTorquesWrites {
             document: Document,
         }
@@ -300,7 +300,7 @@ pub struct ReportDrives {
 }
 
 crate::stage! {
-    ReportDrives, "report_drives", 4, "writes one self-contained HTML file: commanded, measured and simulated angles before and after, what was found",
+    ReportDrives, "report_drives", 5, "writes one self-contained HTML file: commanded, measured and simulated angles before and after, what was found",
         ReportDrivesReads -> ReportDrivesWrites {
             document: Document,
         }

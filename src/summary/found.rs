@@ -301,7 +301,8 @@ fn number(shown: &str, all: &[FoundNumber]) -> Option<String> {
             let is_called = |one: &&FoundNumber| {
                 one.name.rsplit(['.', '_']).next() == Some(name) || one.name == name
             };
-            let one = all.iter().find(is_called)?;
+            let alone = || all.first().filter(|_| all.len() == 1);
+            let one = all.iter().find(is_called).or_else(alone)?;
             let is_more =
                 ["mass", "moment", "relative", "offset"].contains(&name) && one.value > 0.0;
             Some(format!(

@@ -197,7 +197,7 @@ fn a_recording_without_a_missing_effect_has_no_findings() {
             .as_array()
             .unwrap()
             .iter()
-            .any(|line| line.as_str().unwrap().contains("tracker_scale"))
+            .any(|line| line.as_str().unwrap().contains("tracker scale"))
     );
 }
 

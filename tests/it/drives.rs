@@ -468,6 +468,50 @@ fn init_writes_the_pipeline_of_commands_and_angles() {
 }
 
 #[test]
+fn a_text_of_a_german_spreadsheet_is_read_and_pauses_of_its_stamps_part_trajectories() {
+    let plain = folder();
+    let case = tempfile::tempdir().unwrap();
+    put(case.path(), "robot.xml", &plain.robot);
+    let mut text = "Zeit [s];Fahrt;soll_j1 [rad];ist_j1 [rad];Akku [V]\n".to_string();
+    for (row, line) in plain.recording.lines().skip(1).enumerate() {
+        let cells: Vec<&str> = line.split(',').collect();
+        let later = if row < 120 { 0.0 } else { 4.0 };
+        let time = cells[0].parse::<f64>().unwrap() + later;
+        text += &format!("{time:.2};7;{};{};24.1\n", cells[3], cells[4]).replace('.', ",");
+    }
+    put(case.path(), "fahrt.csv", text);
+    let answer = calib(case.path(), "init arm --data fahrt.csv --mjcf robot.xml");
+    assert_eq!(answer.code, Some(0), "{}", answer.both());
+    for said in ["trajectories by Fahrt", "not used: Akku [V]", "100 Hz"] {
+        assert!(answer.both().contains(said), "{said}: {}", answer.both());
+    }
+    let pipeline = read(case.path().join("arm/pipeline.yaml"));
+    for line in [
+        "delimiter: \";\"",
+        "decimal: comma",
+        "trajectory: \"Fahrt\"",
+        "command: \"soll_j{j} [rad]\"",
+        "angle: \"ist_j{j} [rad]\"",
+    ] {
+        assert!(pipeline.contains(line), "expected `{line}` in {pipeline}");
+    }
+    let drives = json!({ "command_rate_hz": 100.0, "joints": plain.drives["joints"] });
+    put(&case.path().join("arm"), "drives.json", drives.to_string());
+    let found = calib(case.path(), "diagnose arm/pipeline.yaml --store store");
+    assert_eq!(found.code, Some(0), "{}", found.both());
+    let pause = "1 pause of more than 0.5 s in the stamps; a trajectory begins anew after each";
+    assert!(found.err.contains(pause), "{}", found.err);
+    let pointed = pipeline.replace("        decimal: comma\n", "");
+    put(&case.path().join("arm"), "pointed.yaml", pointed);
+    let refused = calib(case.path(), "diagnose arm/pointed.yaml --store store");
+    assert!(
+        refused.err.contains("`text: {decimal: comma}`"),
+        "{}",
+        refused.err
+    );
+}
+
+#[test]
 fn init_finds_commands_and_angles_of_real_recordings() {
     let Some(data) = shared("data") else {
         return;

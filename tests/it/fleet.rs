@@ -287,3 +287,19 @@ fn every_fault_of_a_fleet_file_comes_at_once_with_its_place() {
         ],
     );
 }
+
+#[test]
+fn folders_of_robots_may_be_named_from_the_root() {
+    let folder = tempfile::tempdir().unwrap();
+    let cells = folder.path().join("cells");
+    for name in ["north", "south"] {
+        std::fs::create_dir_all(cells.join(name)).unwrap();
+    }
+    let file = file(
+        &folder.path().join("elsewhere"),
+        "far",
+        &format!("robots:\n  - folders: {}/*\n", cells.display()),
+    );
+    let (_, printed) = output(&mut fleet("status", &file, &folder.path().join("store")));
+    has(&printed, "fleet far: 0 of 2 robots done");
+}

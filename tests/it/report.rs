@@ -410,7 +410,7 @@ fn the_same_tables_give_the_same_bytes() {
 #[test]
 fn what_was_rejected_is_counted_whole_and_listed_to_the_fiftieth() {
     let page = html(Report::default(), tables("Heavy 6R, cell 4"));
-    assert!(page.contains("61 rows were read and not used"));
+    assert!(page.contains("rows that were read and not used: 61"));
     assert_eq!(page.matches("2026-11-02T09:14").count(), 50);
     let mut reads = tables("Heavy 6R, cell 4");
     reads.intake[0].table.0[0].accepted = 499;

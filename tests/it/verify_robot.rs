@@ -122,6 +122,28 @@ fn what_compensation_achieved_is_measured_against_the_wanted_points() {
             .all(|number| page.contains(&format!("<td>{number}</td>"))),
         "{numbers:?}"
     );
+    run("verify-robot cell/pipeline.yaml second.csv --quiet --html nachweis.html --language de");
+    let german = std::fs::read_to_string(folder.path().join("nachweis.html")).unwrap();
+    has(
+        &german,
+        [
+            "<html lang=\"de\">",
+            "Was die Kompensation erreicht hat",
+            "erreicht: 42 Messpunkte",
+            "Stellungen mit mindestens 30 Zyklen, mm",
+        ],
+    );
+    // A table has one decimal mark, in lines without decimals too.
+    put(
+        folder.path(),
+        "ziele.csv",
+        "name;J1_deg;J2_deg;J3_deg;J4_deg;J5_deg;J6_deg\nA;10;5;-20;20;30;5\nB;10,5;5;-20;20;30;5\nC;20;5;-20;20;30;5\n",
+    );
+    run("compensate cell/pipeline.yaml ziele.csv --out korrigiert.csv --quiet");
+    let marked = std::fs::read_to_string(folder.path().join("korrigiert.csv")).unwrap();
+    for line in marked.lines().skip(1) {
+        assert!(line.contains(',') && !line.contains('.'), "{line}");
+    }
     assert!(
         page.contains("<th scope=\"row\">1</th><td>30</td>") && page.matches("<svg ").count() == 1,
         "{page}"

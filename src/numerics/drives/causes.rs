@@ -25,9 +25,9 @@ causes! {
     TORQUE_LIMIT = "torque_limit", "load", -5.3, "the drive at {} gives less torque than simulated", ["limit" "Nm" true];
     SPEED_LIMIT = "speed_limit", "command", -5.3, "the set point at {} moves no faster than a limit", ["limit" "rad/s" true];
     SAG = "voltage_sag", "load", -5.3, "the supply gives way under the load of all drives: {}", ["share per torque" "1/Nm" false];
-    VISCOUS = "viscous_friction", "own speed", -3.9, "friction at {} grows with speed", ["b" "Nm s/rad" false];
-    COULOMB = "coulomb_friction", "own speed", -3.9, "dry friction at {} is another one", ["c" "Nm" false];
-    STRIBECK = "stribeck_friction", "own speed", -5.3, "friction at {} falls as the joint begins to move", ["s" "Nm" false, "speed" "rad/s" true];
+    VISCOUS = "viscous_friction", "own speed", -3.9, "friction at {} grows with speed", ["viscous" "Nm s/rad" false];
+    COULOMB = "coulomb_friction", "own speed", -3.9, "dry friction at {} is another one", ["coulomb" "Nm" false];
+    STRIBECK = "stribeck_friction", "own speed", -5.3, "friction at {} falls as the joint begins to move", ["stribeck" "Nm" false, "speed" "rad/s" true];
     LOAD = "load_friction", "load", -5.3, "friction at {} grows with the load", ["driving" "1" false, "driven back" "1" false];
     PRESLIDING = "presliding_friction", "own speed", -5.3, "friction at {} bends before it slides", ["travel" "rad" true];
     WARM_UP = "warmup_friction", "time", -6.2, "friction at {} goes as the joint warms up", ["share of dry friction" "1" false, "share of viscous friction" "1" false, "time constant" "s" true];

@@ -49,6 +49,8 @@ pub(crate) struct Commands {
 
 /// Rows that may be missing between two.
 const GAP: f64 = 12.0;
+/// s without rows after which nobody knows what was commanded and what the arm did: a trajectory begins anew.
+pub const PAUSE: f64 = 0.5;
 /// s between two recordings, whose clocks do not say it.
 const BREAK: f64 = 1.0;
 /// s at the beginning in which a trajectory rests.
@@ -59,6 +61,23 @@ const SIGMAS_AT_REST: f64 = 8.0;
 /// s, and rows at least, from which the speed of a joint is estimated that moves at the beginning.
 const GLANCE: f64 = 0.06;
 const LOOKS: usize = 5;
+
+/// Runs of rows, parted where the stamps have a pause.
+pub fn without_pauses(time: &[f64], runs: &[Range<usize>], period: f64) -> Vec<Range<usize>> {
+    let most = PAUSE.max(GAP * period);
+    let mut parted = Vec::new();
+    for run in runs {
+        let mut start = run.start;
+        for row in run.start + 1..run.end {
+            if time[row] - time[row - 1] > most {
+                parted.push(start..row);
+                start = row;
+            }
+        }
+        parted.push(start..run.end);
+    }
+    parted
+}
 
 impl Recording {
     /// Number of joints.

@@ -1,5 +1,6 @@
 //! What a mechanic is told of a finding: words with holes.
 
+use super::summary::{root_of_squares, said};
 use super::{
     Basis, Cause, Clock, ParameterEstimate, Summary, Term, Variable, figure, law_shapes, names,
     unknown,
@@ -72,8 +73,8 @@ pub(super) fn hole(
         "size" => summary.size(),
         "unit" => known(first.map(|number| number.unit.to_string())),
         "length" => {
-            let square: f64 = numbers.iter().map(|number| number.value.powi(2)).sum();
-            known(first.map(|number| format!("{} {}", figure(square.sqrt(), 3), number.unit)))
+            let (size, sigma) = root_of_squares(numbers);
+            known(first.map(|number| format!("{} {}", said(size, sigma, 3), number.unit)))
         }
         "order" => known(order().map(|order| match order.fract().abs() < 1e-9 {
             true => format!("{order:.0}"),
@@ -130,10 +131,9 @@ pub(super) fn hole(
         number => {
             let scaled = || {
                 let (scale, decimals) = number.split_once(':')?;
-                Some(figure(
-                    first?.value * scale.parse::<f64>().ok()?,
-                    decimals.parse().ok()?,
-                ))
+                let (first, scale) = (first?, scale.parse::<f64>().ok()?);
+                let sigma = first.sigma.map(|sigma| sigma * scale.abs());
+                Some(said(first.value * scale, sigma, decimals.parse().ok()?))
             };
             known(scaled())
         }
@@ -143,7 +143,10 @@ pub(super) fn hole(
 /// The amplitude of a sine and a cosine, the first two of some numbers.
 fn amplitude(numbers: &[&ParameterEstimate]) -> String {
     match numbers {
-        [a, b, ..] => format!("{} {}", figure(a.value.hypot(b.value), 0), a.unit),
+        [a, b, ..] => {
+            let (size, sigma) = root_of_squares(&[a, b]);
+            format!("{} {}", said(size, sigma, 0), a.unit)
+        }
         _ => String::new(),
     }
 }

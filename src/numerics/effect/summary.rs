@@ -2,6 +2,7 @@
 
 use super::{Basis, Cause, Clock, EffectStack, Form, Place, Term, Variable, cause, figure, names};
 use crate::criteria::words::CONSTANT;
+use crate::figures::measured;
 use crate::robot::{Measurements, RobotModel, Travel};
 use crate::units::Unit;
 use nalgebra::Vector3;
@@ -29,6 +30,27 @@ pub fn people(unit: Unit) -> (Unit, &'static str) {
         Unit::RadianPerRadianPerSecond => (Unit::ArcsecondPerDegreePerSecond, "arcsec/(deg/s)"),
         other => (other, other.symbol()),
     }
+}
+
+/// A number with the digits that its standard deviation tells, where that was estimated; else with its usual decimals.
+pub(super) fn said(value: f64, sigma: Option<f64>, decimals: usize) -> String {
+    match sigma.filter(|sigma| *sigma > 0.0 && sigma.is_finite()) {
+        Some(sigma) => measured(value, Some(sigma)),
+        None => figure(value, decimals),
+    }
+}
+
+/// The root of the sum of squares of numbers, with its standard deviation where all have one.
+pub(super) fn root_of_squares(numbers: &[&ParameterEstimate]) -> (f64, Option<f64>) {
+    let size = numbers.iter().map(|n| n.value.powi(2)).sum::<f64>().sqrt();
+    let of_each = numbers.iter().map(|n| Some((n.value * n.sigma?).powi(2)));
+    let square: Option<f64> = of_each.sum();
+    (
+        size,
+        square
+            .filter(|_| size > 0.0)
+            .map(|square| square.sqrt() / size),
+    )
 }
 
 /// The unit behind a number; none of ratios.
@@ -123,7 +145,7 @@ impl<'a> Summary<'a> {
     /// The size of the first number with its unit.
     pub(super) fn size(&self) -> String {
         self.parameters.first().map_or_else(String::new, |n| {
-            format!("{}{}", figure(n.value.abs(), 0), unit(n))
+            format!("{}{}", said(n.value.abs(), n.sigma, 0), unit(n))
         })
     }
 }

@@ -2,10 +2,11 @@
 //! nothing).
 
 use super::form::placed;
+use super::summary::said;
 use super::unknown::described;
 use super::{
     ArmState, BeyondRange, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion,
-    Place, Placed, Summary, Survey, Variable, figure, names,
+    Place, Placed, Summary, Survey, Variable, names,
 };
 use crate::criteria::effect::{RARE, UNCOMMON};
 use crate::robot::{LoadCorrection, RobotModel};
@@ -357,14 +358,14 @@ fn declared_otherwise(summary: &Summary) -> String {
             let how = if n.value < 0.0 { "less" } else { "more" };
             format!(
                 "the tool weighs {} kg {how} than the robot file and the payload say",
-                figure(n.value.abs(), 1)
+                said(n.value.abs(), n.sigma, 1)
             )
         }
         Some(n) => {
             let how = if n.value < 0.0 { "lighter" } else { "heavier" };
             format!(
                 "the payload is {} % {how} than declared",
-                figure(n.value.abs() * 100.0, 1)
+                said(n.value.abs() * 100.0, n.sigma.map(|sigma| 100.0 * sigma), 1)
             )
         }
         None => "the payload is not what was declared".to_string(),

@@ -76,6 +76,7 @@ pub fn stream(
         form,
         number,
         head,
+        comma: None,
         rows: Vec::new(),
     };
     let unreached = corrected(&mut table, &columns, layout, corrector)?;
@@ -188,10 +189,10 @@ pub(super) fn delimiter(header: &str) -> char {
         .unwrap_or(',')
 }
 
-/// Where a line's joints stand, in the order of the line, and whether its numbers have a comma.
+/// Where a line's joints stand, in the order of the line, and whether its numbers have a decimal comma, where it has decimals.
 struct Spans {
     joints: Vec<Range<usize>>,
-    comma: bool,
+    comma: Option<bool>,
 }
 
 struct TextTable<'a> {
@@ -202,6 +203,8 @@ struct TextTable<'a> {
     number: usize,
     /// What is written before the next rows.
     head: String,
+    /// Whether the first line with decimals has a comma: lines without any are written as it is, so that a table has one mark.
+    comma: Option<bool>,
     /// The lines that were read last; blank ones hold no target.
     rows: Vec<(String, Option<Spans>)>,
 }
@@ -222,6 +225,9 @@ impl TargetTable for TextTable<'_> {
         });
         let (mut faults, mut targets) = (Vec::new(), Vec::with_capacity(lines.len()));
         let read: Vec<Result<Option<(CommandTarget, Spans)>, String>> = read.collect();
+        let mut read_here = read.iter().flatten().flatten();
+        let found = read_here.find_map(|(_, spans)| spans.comma);
+        self.comma = self.comma.or(found);
         self.rows.clear();
         for ((number, line), read) in (first..).zip(lines).zip(read) {
             match read {
@@ -252,7 +258,7 @@ impl TargetTable for TextTable<'_> {
         let rows: Vec<(&str, Option<(&Spans, &CorrectedCommand)>)> = rows.collect();
         let written: Vec<String> = rows
             .par_chunks(CHUNK)
-            .map(|rows| form.lines(rows))
+            .map(|rows| form.lines(rows, self.comma == Some(true)))
             .collect();
         for text in std::iter::once(&std::mem::take(&mut self.head)).chain(&written) {
             if !put(self.output, text)? {
@@ -278,9 +284,17 @@ impl TextForm<'_> {
         let (body, _) = split_ending(line);
         let cells = fields(body, self.delimiter)?;
         let row = row(&cells, self.delimiter, self.columns, self.layout)?;
-        let comma = self.delimiter != ','
-            && body.contains(',')
-            && cells.iter().any(|(_, text)| is_comma_number(text));
+        let has = |mark: char, is_so: fn(&str) -> bool| {
+            body.contains(mark) && cells.iter().any(|(_, text)| is_so(text))
+        };
+        let comma = match self.delimiter {
+            ',' => Some(false),
+            _ if has(',', is_comma_number) => Some(true),
+            _ => has('.', |text| {
+                text.contains('.') && text.parse::<f64>().is_ok()
+            })
+            .then_some(false),
+        };
         let joints = self.joints.iter();
         let joints = joints.map(|(index, ..)| cells[*index].0.clone()).collect();
         Ok((
@@ -290,20 +304,31 @@ impl TextForm<'_> {
     }
 
     /// Lines with their targets' results; lines without one as they are.
-    fn lines(&self, rows: &[(&str, Option<(&Spans, &CorrectedCommand)>)]) -> String {
+    fn lines(&self, rows: &[(&str, Option<(&Spans, &CorrectedCommand)>)], comma: bool) -> String {
         let mut out = String::with_capacity(rows.iter().map(|(line, _)| line.len() + 64).sum());
         for (line, answered) in rows {
             match answered {
-                Some((spans, answer)) => self.line(&mut out, line, spans, answer),
+                Some((spans, answer)) => self.line(&mut out, line, spans, comma, answer),
                 None => out.push_str(line),
             }
         }
         out
     }
 
-    fn line(&self, out: &mut String, line: &str, spans: &Spans, answer: &CorrectedCommand) {
+    fn line(
+        &self,
+        out: &mut String,
+        line: &str,
+        spans: &Spans,
+        comma: bool,
+        answer: &CorrectedCommand,
+    ) {
         let (body, ending) = split_ending(line);
-        let point = if spans.comma { ',' } else { '.' };
+        let point = if spans.comma.unwrap_or(comma) {
+            ','
+        } else {
+            '.'
+        };
         let number = |out: &mut String, column: Appended| {
             if let Some(value) = column.number(answer) {
                 push_decimal(out, value, decimals(column), point);

@@ -1,9 +1,9 @@
 //! Recordings of drives: tables with a column for each joint or with a list a row, commands in the same file or in one of their own.
 
-use super::DriveColumns;
+use super::DiagnoseDrives;
 use crate::error::{Error, Fault, Result, did_you_mean, listed};
 use crate::ingest::{TableLayout, records};
-use crate::raw::{DecimalMark, Record, TextLayout};
+use crate::raw::{self, DecimalMark, NumberFault, Record};
 use crate::{Context, OpenedInput, RawFile};
 use std::ops::Range;
 
@@ -77,19 +77,23 @@ fn of_joint(column: &str, joint: usize, name: &str) -> String {
 /// with the first cell that is no number.
 pub(super) fn rows(
     file: &RawFile,
-    columns: &DriveColumns,
+    settings: &DiagnoseDrives,
     names: &[String],
     wanted: &[&str],
     context: &Context,
 ) -> Result<(String, Rows)> {
     let OpenedInput { label, reader, .. } = context.services.open(file)?;
+    let columns = &settings.columns;
     let layout = TableLayout {
-        sheet: None,
-        topic: None,
-        text: TextLayout::default(),
-        decimal: DecimalMark::Point,
+        text: settings.text.layout()?,
+        decimal: settings.text.decimal,
+        ..TableLayout::default()
     };
     let (label, mut reader) = records(reader, &label, layout)?;
+    let (decimal, below) = match reader.obeys_layout() {
+        true => (settings.text.decimal, settings.text.skip_below_header),
+        false => (DecimalMark::Point, 0),
+    };
     let mut record = Record::default();
     if !reader.next(&mut record)? {
         return Err(Error::data(
@@ -98,6 +102,9 @@ pub(super) fn rows(
         ));
     }
     let head = record.cells();
+    for _ in 0..below {
+        reader.next(&mut record)?;
+    }
     let find = |name: &str| head.iter().position(|column| column == name);
     let mut faults = Vec::new();
     let mut needed = |name: String| {
@@ -167,7 +174,7 @@ pub(super) fn rows(
         if let Some((_, message)) = &record.fault {
             return Err(Error::data(&place, message));
         }
-        let number = |column: usize| of_cell(&record, &head, column, &place);
+        let number = |column: usize| of_cell(&record, &head, column, decimal, &place);
         out.time.push(by * number(time)?);
         for (cells, values) in cells.iter().zip(&mut out.values) {
             match cells {
@@ -213,11 +220,22 @@ fn finite(text: &str) -> Option<f64> {
         .filter(|value: &f64| value.is_finite())
 }
 
-fn of_cell(record: &Record, head: &[String], column: usize, place: &str) -> Result<f64> {
-    let cell = cell(record, column);
-    finite(cell).ok_or_else(|| {
+fn of_cell(
+    record: &Record,
+    head: &[String],
+    column: usize,
+    decimal: DecimalMark,
+    place: &str,
+) -> Result<f64> {
+    let cell = cell(record, column).trim();
+    raw::number(cell.as_bytes(), decimal).map_err(|fault| {
         let name = &head[column];
-        let message = format!("column `{name}` holds `{cell}`; expected a finite number");
+        let mark = match fault {
+            NumberFault::Comma => " with a decimal point, or `text: {decimal: comma}`",
+            NumberFault::Point => " with a decimal comma, as `text` says",
+            _ => "",
+        };
+        let message = format!("column `{name}` holds `{cell}`; expected a finite number{mark}");
         Error::data(place, message)
     })
 }

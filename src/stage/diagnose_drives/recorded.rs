@@ -3,8 +3,8 @@
 use super::reading::{self, Rows};
 use super::{AngleUnit, DiagnoseDrives, DriveFile, DriveHoldOut, DriveRecording, DriveRecordings};
 use crate::drives::mjcf::MjcfArm;
-use crate::drives::recording::{Recording, Trajectory};
-use crate::error::{Error, Fault, Result};
+use crate::drives::recording::{PAUSE, Recording, Trajectory, without_pauses};
+use crate::error::{Error, Fault, Result, counted};
 use crate::{Context, RawFile};
 
 /// A recording's files, each with its place below `with`.
@@ -97,7 +97,7 @@ impl DiagnoseDrives {
             None => {
                 let wanted = [command, angle];
                 let (label, mut rows) =
-                    reading::rows(source.file.1, columns, &names, &wanted, context)?;
+                    reading::rows(source.file.1, self, &names, &wanted, context)?;
                 let commands = rows.values.remove(0);
                 (label, rows, commands)
             }
@@ -116,6 +116,15 @@ impl DiagnoseDrives {
             let judges = usage.is_some_and(|usage| !self.on.iter().any(|on| on == usage));
             held_out[range.clone()].fill(judges);
         }
+        let period = 1.0 / file.command_rate_hz;
+        let runs = without_pauses(&rows.time, &rows.runs, period);
+        if runs.len() > rows.runs.len() {
+            context.warn(format!(
+                "{label}: {} of more than {PAUSE} s in the stamps; a trajectory begins anew after each",
+                counted(runs.len() - rows.runs.len(), "pause")
+            ));
+        }
+        rows.runs = runs;
         for range in &rows.runs {
             self.hold_out(&rows.time, range, &mut held_out);
         }
@@ -140,7 +149,7 @@ impl DiagnoseDrives {
             trajectories,
             time: rows.time,
             held_out,
-            period: 1.0 / file.command_rate_hz,
+            period,
             encoder: file.joints.iter().map(|joint| joint.encoder_rad).collect(),
             noise: file.joints.iter().map(|joint| joint.noise_rad).collect(),
         };
@@ -187,9 +196,9 @@ impl DiagnoseDrives {
     ) -> Result<(String, Rows, Vec<f64>)> {
         let columns = &self.columns;
         let wanted = [columns.command.as_str()];
-        let (place, mut sent) = reading::rows(sent, columns, names, &wanted, context)?;
+        let (place, mut sent) = reading::rows(sent, self, names, &wanted, context)?;
         let wanted = [columns.angle.as_str()];
-        let (label, mut rows) = reading::rows(angles, columns, names, &wanted, context)?;
+        let (label, mut rows) = reading::rows(angles, self, names, &wanted, context)?;
         reading::must_rise(&place, &sent.time)?;
         let (held, before) = reading::held(&sent.time, &rows.time);
         let beyond = rows.time.last() > sent.time.last();

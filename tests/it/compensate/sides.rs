@@ -212,7 +212,7 @@ fn a_posture_that_no_joints_have_is_refused_with_its_line() {
     let refused = message_of(Language::Rapid, rapid(&at, [0, 0, 0, 1]));
     has(
         &refused,
-        "not reached in the posture that is stated ([0,0,0,1])",
+        "not reached in the posture that is stated ([0,0,0,1]); it is reached in [0,0,0,0]",
     );
     // S alone, of which the wrist turned over is another solution.
     let over = trip

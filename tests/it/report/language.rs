@@ -168,10 +168,11 @@ fn every_message_of_templates_and_sources_has_its_german_and_none_is_left_over()
 }
 
 /// The templates of pages that have languages.
-const TEMPLATES: [&str; 7] = [
+const TEMPLATES: [&str; 8] = [
     include_str!("../../../src/report/report.html"),
     include_str!("../../../src/report/head.html"),
     include_str!("../../../src/report/torques.html"),
+    include_str!("../../../src/report/achieved.html"),
     include_str!("../../../src/report/drives.html"),
     include_str!("../../../src/report/diagnosed.html"),
     include_str!("../../../src/report/fleet.html"),
@@ -309,7 +310,7 @@ const UNTRANSLATED: &str = "the page says this in English, as `de` lacks it: ";
 /// What the tables of these tests say and no stage does.
 const MADE_UP: [&str; 11] = [
     "temperature: none was recorded",
-    "tracker_scale: <measure> a scale bar",
+    "tracker scale: <measure> a scale bar",
     "joint 2 turns unevenly, twice a turn by 25 arcsec <b>",
     "the measured point lies on the axis of joint 6",
     "does the same as link_geometry.l2.z with joint_offset.j2",

@@ -241,7 +241,7 @@ fn verdict() -> Verdict {
 fn sentences() -> VerdictSentences {
     let unseen = [
         "temperature: none was recorded",
-        "tracker_scale: <measure> a scale bar",
+        "tracker scale: <measure> a scale bar",
     ]
     .map(String::from);
     VerdictSentences::of("diagnose", &[(VerdictTopic::NotObservable, &unseen)])

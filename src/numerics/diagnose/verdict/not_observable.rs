@@ -55,7 +55,7 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
     }
     if survey.data.current.is_none() {
         out.push(
-            "counterbalance: without motor currents it is confounded with gear_cyclic of order 1"
+            "counterbalance: without motor currents a gear error of one period a turn looks the same"
                 .into(),
         );
     }
@@ -76,7 +76,7 @@ pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
         out.push("place of the base: it moves with all places that were touched; measure three points of the cell".into());
         out.push("scale of the arm: arm, target and fixtures may all be larger together; state `distances` in `identify`".into());
     } else {
-        out.push("tracker_scale: link lengths absorb it; measure a scale bar".into());
+        out.push("tracker scale: link lengths absorb it; measure a scale bar".into());
     }
     out
 }

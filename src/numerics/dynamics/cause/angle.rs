@@ -51,16 +51,17 @@ pub(crate) static CURRENT_OFFSET: TorqueCause = TorqueCause {
         let is_little = fitted[0].value < 0.0;
         let newtons = unit("Nm");
         let constant = format!(
-            "the torque of {} reads {:.3} {newtons} too {}, whatever it does",
+            "the torque of {} reads {} {newtons} too {}, whatever it does",
             form.place,
-            fitted[0].value.abs(),
+            fitted[0].size().said(),
             if is_little { "little" } else { "much" }
         );
         match fitted.get(1) {
             None => constant,
             Some(cold) => format!(
-                "{constant}; it begins {:.3} {newtons} from that and comes there over {:.1} s",
-                cold.value, form.shape[0]
+                "{constant}; it begins {} {newtons} from that and comes there over {:.1} s",
+                cold.said(),
+                form.shape[0]
             ),
         }
     },
@@ -116,16 +117,16 @@ const SPRING: TorqueCause = TorqueCause {
     statement: |form, fitted, unit| {
         let is_cable = form.cause.name != SPRING_BALANCE_NAME;
         format!(
-            "{} acts on {} with {:.3} {} and {:.3} {} at zero",
+            "{} acts on {} with {} {} and {} {} at zero",
             if is_cable {
                 "a cable or hose"
             } else {
                 "a balancing spring"
             },
             form.place,
-            fitted[0].value,
+            fitted[0].said(),
             unit("Nm/rad"),
-            fitted[1].value,
+            fitted[1].said(),
             unit("Nm")
         )
     },
@@ -199,11 +200,11 @@ pub(super) static BALANCER: TorqueCause = TorqueCause {
         square(values.len()) >= LEAST_WHOLE * LEAST_WHOLE * square(values.len().min(BALANCERS[0]))
     },
     statement: |form, fitted, _| {
-        let size = fitted[0].value.hypot(fitted[1].value);
+        let size = size_of_two(fitted).said();
         // -size sin(q - zero).
         let zero = fitted[0].value.atan2(-fitted[1].value).to_degrees();
         format!(
-            "a balancing spring acts on {} with up to {size:.3} Nm; it pulls towards {zero:.0} deg",
+            "a balancing spring acts on {} with up to {size} Nm; it pulls towards {zero:.0} deg",
             form.place
         )
     },
@@ -271,9 +272,9 @@ pub(super) static RIPPLE: TorqueCause = TorqueCause {
     statement: |form, fitted, _| {
         let [order, motor] = form.with;
         format!(
-            "the torque of {} ripples by {:.3} Nm, {order} times a turn of {}",
+            "the torque of {} ripples by {} Nm, {order} times a turn of {}",
             form.place,
-            size_of_two(fitted).value,
+            size_of_two(fitted).said(),
             ["the joint", "its motor"][motor.min(1)]
         )
     },

@@ -3,7 +3,7 @@
 use super::angle::{UNKNOWN, ends};
 use super::{
     ColumnTorque, FittedNumber, LASTING, PLAIN, ShapeSpan, TorqueCause, TorqueForm, at_each_joint,
-    at_joints, plain, shape, span, warming, wave,
+    at_joints, plain, scaled, shape, span, warming, wave,
 };
 use crate::recording::largest;
 use crate::scene::DynamicScene;
@@ -37,9 +37,9 @@ pub(crate) static VISCOUS_FRICTION: TorqueCause = TorqueCause {
             format!(", which grows with the power {exponent:.2} of speed")
         });
         format!(
-            "{} has viscous friction of {:.3} {}{grows}",
+            "{} has viscous friction of {} {}{grows}",
             form.place,
-            fitted[0].value,
+            fitted[0].said(),
             unit("Nm s/rad")
         )
     },
@@ -86,9 +86,9 @@ pub(crate) static COULOMB_FRICTION: TorqueCause = TorqueCause {
     torque: ColumnTorque::Friction(|_, _, _, sign| sign),
     statement: |form, fitted, unit| {
         format!(
-            "{} has Coulomb friction of {:.3} {}",
+            "{} has Coulomb friction of {} {}",
             form.place,
-            fitted[0].value,
+            fitted[0].said(),
             unit("Nm")
         )
     },
@@ -107,9 +107,9 @@ pub(super) static ASYMMETRIC: TorqueCause = TorqueCause {
     statement: |form, fitted, unit| {
         let is_negative = fitted[0].value < 0.0;
         format!(
-            "friction of {} is {:.3} {} greater in its {} direction",
+            "friction of {} is {} {} greater in its {} direction",
             form.place,
-            fitted[0].value.abs(),
+            fitted[0].size().said(),
             unit("Nm"),
             if is_negative { "negative" } else { "positive" }
         )
@@ -163,9 +163,9 @@ pub(super) static STRIBECK: TorqueCause = TorqueCause {
     torque: ColumnTorque::Friction(|form, _, velocity, sign| sign * falls(form, velocity)),
     statement: |form, fitted, unit| {
         format!(
-            "friction of {} is {:.3} {} greater when it begins to move, which falls over {:.3} {}",
+            "friction of {} is {} {} greater when it begins to move, which falls over {:.3} {}",
             form.place,
-            fitted[0].value,
+            fitted[0].said(),
             unit("Nm"),
             form.shape[0],
             unit("rad/s")
@@ -245,7 +245,7 @@ pub(super) static LOAD: TorqueCause = TorqueCause {
     },
     statement: |form, fitted, unit| {
         let (place, exponent) = (form.place, power_of_load(form));
-        let percent = |share: &FittedNumber| format!("{:.1} %", 100.0 * share.value);
+        let percent = |share: &FittedNumber| format!("{} %", scaled(share, 100.0).said());
         let transmitted = match exponent == LINEAR {
             true => "of the torque that it transmits".to_string(),
             false => format!(
@@ -336,11 +336,11 @@ pub(super) static WARMUP: TorqueCause = TorqueCause {
     }),
     statement: |form, fitted, unit| {
         format!(
-            "friction of {} begins {:.3} {} and {:.3} {} higher and falls over {:.1} s",
+            "friction of {} begins {} {} and {} {} higher and falls over {:.1} s",
             form.place,
-            fitted[1].value,
+            fitted[1].said(),
             unit("Nm"),
-            fitted[0].value,
+            fitted[0].said(),
             unit("Nm s/rad"),
             form.shape[0]
         )
@@ -429,12 +429,12 @@ pub(super) static WRIST_COUPLING: TorqueCause = TorqueCause {
     },
     statement: |form, fitted, _| {
         format!(
-            "gears of {} turn with joint {} too (ratio {:.2}): friction of both together is {:.3} Nm and {:.3} Nm s/rad",
+            "gears of {} turn with joint {} too (ratio {:.2}): friction of both together is {} Nm and {} Nm s/rad",
             form.place,
             form.with[0] + 1,
             form.shape[0],
-            fitted[1].value,
-            fitted[0].value
+            fitted[1].said(),
+            fitted[0].said()
         )
     },
     ..PLAIN

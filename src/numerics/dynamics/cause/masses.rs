@@ -3,7 +3,7 @@
 use super::InertialChanges;
 use super::{
     ColumnTorque, FittedNumber, PLAIN, SEEN, TorqueCause, TorqueForm, at_each_joint, at_each_link,
-    plain, shape, size_of_two, span,
+    plain, scaled, shape, size_of_two, span,
 };
 use crate::arm::{
     DynamicArm, INERTIAL_NAMES, INERTIAL_NUMBERS, Inertial, inertial_unit, numbers, unit_number,
@@ -12,14 +12,6 @@ use crate::effect::Place;
 use crate::recording::largest;
 use crate::scene::DynamicScene;
 use nalgebra::{Matrix3, Vector3};
-
-/// A number times a factor.
-fn scaled(number: &FittedNumber, by: f64) -> FittedNumber {
-    FittedNumber {
-        value: by * number.value,
-        sigma: by * number.sigma,
-    }
-}
 
 /// kg: less is nothing to have a centre.
 const LIGHTEST: f64 = 0.1;
@@ -216,7 +208,7 @@ fn grams(number: FittedNumber, rest: &str) -> String {
             format!("{value:.decimals$} +- {sigma:.decimals$} g{rest}")
         }
         true => format!("{:.0} g{rest}", 1e3 * number.value),
-        false => format!("{:.2} kg{rest}", number.value),
+        false => format!("{} kg{rest}", number.said()),
     }
 }
 
@@ -428,7 +420,7 @@ pub(super) static LINK_CENTRE: TorqueCause = TorqueCause {
         }
         let parts = told.iter().map(|(name, value)| {
             let axis = name.rsplit('_').next().unwrap_or_default();
-            format!("{:.1} mm along {axis}", value.value)
+            format!("{} mm along {axis}", value.said())
         });
         format!(
             "the centre of mass of {} is {} from where it is declared; how far it is off elsewhere is not seen",
@@ -459,12 +451,12 @@ pub(super) static LINK_INERTIA: TorqueCause = TorqueCause {
     },
     statement: |form, fitted, _| {
         let told = seen_inertias(fitted);
-        let values = told.iter().map(|(_, number)| number.value);
-        let largest = values.max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let values = told.iter().map(|(_, number)| number);
+        let largest = values.max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()));
         format!(
-            "the inertia of {} is off, by up to {:.3} kg m2",
+            "the inertia of {} is off, by up to {} kg m2",
             form.place,
-            largest.unwrap_or(0.0)
+            largest.map_or_else(String::new, FittedNumber::said)
         )
     },
     ..PLAIN
@@ -514,8 +506,8 @@ pub(super) static GRAVITY_DIRECTION: TorqueCause = TorqueCause {
     statement: |_, fitted, _| {
         let azimuth = fitted[1].value.atan2(fitted[0].value).to_degrees();
         format!(
-            "the base is tilted by {:.2} deg: gravity pulls towards {azimuth:.0} deg of the plane across the declared one",
-            tilt(fitted).value.to_degrees()
+            "the base is tilted by {} deg: gravity pulls towards {azimuth:.0} deg of the plane across the declared one",
+            scaled(&tilt(fitted), 1f64.to_degrees()).said()
         )
     },
     ..PLAIN
@@ -594,13 +586,16 @@ pub(super) static WRONG_CONSTANT: TorqueCause = TorqueCause {
         }
     }),
     statement: |form, fitted, unit| {
-        let (place, percent) = (form.place, 100.0 * fitted[0].value);
+        let place = form.place;
+        let percent = scaled(&fitted[0], 100.0);
+        let sign = if percent.value < 0.0 { "" } else { "+" };
+        let percent = format!("{sign}{}", percent.said());
         match form.shape.first() {
             None => format!(
-                "torques of {place} read {percent:+.1} % off: its torque constant is not the declared one"
+                "torques of {place} read {percent} % off: its torque constant is not the declared one"
             ),
             Some(half) => format!(
-                "small torques of {place} read {percent:+.1} % off, half of that at {half:.3} {}: its torque constant is not the declared one",
+                "small torques of {place} read {percent} % off, half of that at {half:.3} {}: its torque constant is not the declared one",
                 unit("Nm")
             ),
         }

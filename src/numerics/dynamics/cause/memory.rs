@@ -154,9 +154,9 @@ pub(super) static SPIKES: TorqueCause = TorqueCause {
     }),
     statement: |form, fitted, unit| {
         format!(
-            "each reversal of {} knocks with {:.3} {}, {:.3} s later: lost motion",
+            "each reversal of {} knocks with {} {}, {:.3} s later: lost motion",
             form.place,
-            fitted[0].value,
+            fitted[0].said(),
             unit("Nm"),
             form.shape[0]
         )

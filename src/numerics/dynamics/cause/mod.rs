@@ -17,6 +17,7 @@ use super::sliding::UnitAt;
 use crate::criteria::torque::AT_END;
 use crate::effect::{DeclaredTorque, Place};
 pub(super) use angle::{CURRENT_OFFSET, OFFSET, UNKNOWN};
+use calib_numerics::figures::measured;
 pub(super) use declared::declared;
 pub use friction::COULOMB;
 pub(super) use friction::{
@@ -285,6 +286,19 @@ pub struct FittedNumber {
 const SEEN: f64 = 0.5;
 
 impl FittedNumber {
+    /// With the digits that its standard deviation tells.
+    pub(crate) fn said(&self) -> String {
+        measured(self.value, Some(self.sigma))
+    }
+
+    /// Its size alone.
+    pub(crate) fn size(&self) -> Self {
+        Self {
+            value: self.value.abs(),
+            ..*self
+        }
+    }
+
     /// Whether its rows show it.
     pub(crate) fn is_seen(&self) -> bool {
         self.sigma > 0.0 && self.sigma < SEEN * self.value.abs()
@@ -601,6 +615,14 @@ fn span(name: &'static str, unit: &'static str, [least, most]: [f64; 2]) -> Shap
         most,
         by_ratio: true,
         usual: None,
+    }
+}
+
+/// A number times a factor.
+fn scaled(number: &FittedNumber, by: f64) -> FittedNumber {
+    FittedNumber {
+        value: by * number.value,
+        sigma: by * number.sigma,
     }
 }
 
