@@ -32,6 +32,8 @@ pub(super) struct CauseTable<'f, 'a> {
     pub(crate) numbers: Vec<Variable>,
     /// Cells that were likely at the last look.
     pub(crate) likely: Vec<usize>,
+    /// Keys of cells of components in whose stead every other cell was far less probable when it was last asked, here or around the model before.
+    pub(crate) firm: BTreeSet<String>,
     /// Keys of cells that are in the model around which the rows are looked at.
     pub(crate) from_before: Vec<String>,
     /// Cells of effects that the user declares.
@@ -111,6 +113,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             likely: Vec::new(),
             declared: declared.collect(),
             from_before: Vec::new(),
+            firm: BTreeSet::new(),
             multiplied: shown.to_vec(),
             has_steps: false,
             bent: match excludes(names::JOINT_HARDENING) {
@@ -268,7 +271,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     pub(crate) fn state(&self, components: &[Component], kappa: Option<f64>) -> KnownState {
-        self.parts.know(components, self.frame);
+        self.parts.know(components.iter(), self.frame);
         KnownState::of(components.to_vec(), &self.parts, self.frame, kappa)
     }
 }
