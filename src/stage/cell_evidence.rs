@@ -42,7 +42,7 @@ pub struct Given {
 }
 
 crate::stage! {
-    CellEvidence, "cell_evidence", 8, "says what every possible cause explains of one robot, for the sum over a fleet",
+    CellEvidence, "cell_evidence", 9, "says what every possible cause explains of one robot, for the sum over a fleet",
         DiagnoseReads -> CellEvidenceWrites {
             cell_evidence: CellEvidenceTable,
         }
@@ -78,7 +78,7 @@ impl Stage for CellEvidence {
 }
 
 crate::stage! {
-    TorqueEvidence, "torque_evidence", 9, "says what every possible cause explains of the torques of one robot",
+    TorqueEvidence, "torque_evidence", 10, "says what every possible cause explains of the torques of one robot",
         DiagnoseTorquesReads -> CellEvidenceWrites
 }
 
