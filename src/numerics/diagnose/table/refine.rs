@@ -195,7 +195,7 @@ impl CauseTable<'_, '_> {
                     is_same: &|a, b| a == b,
                     is_worth,
                 };
-                if near(form, 0).is_empty() {
+                if (0..*LEVELS).all(|level| near(form, level).is_empty()) {
                     return None;
                 }
                 let (form, evidence) = rules.from(form.clone(), start()?)?;

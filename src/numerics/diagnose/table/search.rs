@@ -342,24 +342,15 @@ impl CauseTable<'_, '_> {
             let before = self.total(&components, kappa);
             let mut next = without(&components, &[at]);
             // Coefficients are always those of all components together: taking all anew changes sizes and shapes, and gains little.
-            let without = self.total(&next, kappa);
-            let near = before - (*NEARLY * (before - without)).max(*JOINS);
-            let mut last = without;
-            for more in (0..*WAVES).rev() {
+            let near = before - (*NEARLY * (before - self.total(&next, kappa))).max(*JOINS);
+            for _ in 0..*WAVES {
                 let state = self.state(&next, Some(kappa));
                 let scan = self.scan_some(&named, &state, 4, &[]);
                 let Some(best) = scan.best().filter(|best| scan.log_odds[*best] > 0.0) else {
                     break;
                 };
                 next.push(self.component(best, &scan.closely[&best]));
-                let total = self.total(&next, kappa);
-                let gained = total - last;
-                last = total;
-                // Each of those to come adds no more than this one did.
-                if total + more as f64 * gained.max(0.0) < near {
-                    break;
-                }
-                if total < near {
+                if self.total(&next, kappa) < near {
                     continue;
                 }
                 next = self.backfit(next, 1);
