@@ -32,8 +32,6 @@ pub(super) struct CauseTable<'f, 'a> {
     pub(crate) numbers: Vec<Variable>,
     /// Cells that were likely at the last look.
     pub(crate) likely: Vec<usize>,
-    /// Keys of cells of components in whose stead every other cell was far less probable when it was last asked, here or around the model before.
-    pub(crate) firm: BTreeSet<String>,
     /// Keys of cells that are in the model around which the rows are looked at.
     pub(crate) from_before: Vec<String>,
     /// Cells of effects that the user declares.
@@ -113,7 +111,6 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             likely: Vec::new(),
             declared: declared.collect(),
             from_before: Vec::new(),
-            firm: BTreeSet::new(),
             multiplied: shown.to_vec(),
             has_steps: false,
             bent: match excludes(names::JOINT_HARDENING) {

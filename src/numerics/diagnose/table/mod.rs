@@ -62,8 +62,6 @@ pub(crate) struct Rounds {
     all_count: bool,
     first: Option<(Located, f64)>,
     round: usize,
-    /// Keys of cells of components that are not asked for another one: every other was far less probable. The answer asks them all the same.
-    firm: BTreeSet<String>,
     /// Keys of cells that are not asked again: in the whole model they came to nothing.
     empty: BTreeSet<String>,
     /// Keys of the cells of sets that were answered, or that an answer led to.
@@ -191,7 +189,6 @@ impl Rounds {
         let is_open = self.is_open || survey.rows.len() >= *OPEN;
         let mut table = CauseTable::new(&mut frame, &survey, question, products, is_open, keeps);
         table.from_before.clone_from(&before);
-        table.firm = std::mem::take(&mut self.firm);
         table.has_steps = self.pairs.is_some();
         let mut components = Vec::new();
         for (key, component) in known.components {
@@ -237,7 +234,6 @@ impl Rounds {
             if !is_open {
                 self.is_open = unexplained;
                 is_last = !unexplained;
-                table.firm.clear();
             } else if self.pairs.is_none() {
                 let named = table.named(&components);
                 let mut seen = Vec::new();
@@ -255,7 +251,6 @@ impl Rounds {
                 is_last = seen.is_empty() && !self.all_count;
                 self.has_new_pairs = !is_last;
                 self.pairs = Some(seen);
-                table.firm.clear();
             }
         }
         let answer = is_last.then(|| {
@@ -272,7 +267,6 @@ impl Rounds {
         });
         self.exchanged.insert(keys);
         self.better = better.map(|next| KnownComponents::of(&table, next));
-        self.firm = std::mem::take(&mut table.firm);
         let mut causes = estimated(&table, &components);
         by_currents(&mut causes, view);
         let cells = table.cells.len();

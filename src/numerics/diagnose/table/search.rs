@@ -215,6 +215,9 @@ impl CauseTable<'_, '_> {
             cells
         };
         let mut seen = BTreeSet::from([key(&components)]);
+        // Cells in whose stead every other was far less probable: after an exchange of what they have nothing in common with they are not asked
+        // again.
+        let mut firm = BTreeSet::new();
         'rounds: for _ in 0..*EXCHANGES {
             let kappa = self.noise(&components);
             let mut order: Vec<usize> = (0..components.len()).collect();
@@ -222,7 +225,7 @@ impl CauseTable<'_, '_> {
             order.sort_by(|a, b| size(a).total_cmp(&size(b)));
             for i in order {
                 let cell = components[i].cell;
-                if self.firm.contains(&self.cells[cell].key) {
+                if firm.contains(&cell) {
                     continue;
                 }
                 let state = self.state(&without(&components, &[i]), Some(kappa));
@@ -239,7 +242,7 @@ impl CauseTable<'_, '_> {
                     let others = scan.closely.keys().filter(|other| **other != cell);
                     let most = others.map(|other| scan.log_odds[*other]);
                     if most.fold(f64::NEG_INFINITY, f64::max) < stays - *FAR_BELOW {
-                        self.firm.insert(self.cells[cell].key.clone());
+                        firm.insert(cell);
                     }
                     continue;
                 }
@@ -247,7 +250,7 @@ impl CauseTable<'_, '_> {
                 next.push(self.component(best, &scan.closely[&best]));
                 let next = self.backfit(next, 1);
                 if seen.insert(key(&next)) {
-                    self.loosen(&next, &components[i]);
+                    self.loosen(&mut firm, &next, &components[i]);
                     components = next;
                     continue 'rounds;
                 }
@@ -258,7 +261,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// Components that do in part what one does that is gone, or what the newest does, are asked again.
-    fn loosen(&mut self, components: &[Component], gone: &Component) {
+    fn loosen(&self, firm: &mut BTreeSet<usize>, components: &[Component], gone: &Component) {
         let Some((newest, others)) = components.split_last() else {
             return;
         };
@@ -266,7 +269,7 @@ impl CauseTable<'_, '_> {
         for other in others {
             let coupled = |one: &Component| self.parts.overlap(other, one) > *COUPLED;
             if coupled(gone) || coupled(newest) {
-                self.firm.remove(&self.cells[other.cell].key);
+                firm.remove(&other.cell);
             }
         }
     }
@@ -278,8 +281,6 @@ impl CauseTable<'_, '_> {
         if named.len() == components.len() {
             return components;
         }
-        // What is far from an exchange beside some is not so beside others.
-        let firm = std::mem::take(&mut self.firm);
         let mut others = self.anew(named);
         others = self.grow(others);
         others = self.swap(others);
@@ -287,7 +288,6 @@ impl CauseTable<'_, '_> {
         if self.is_better(&others, &components) {
             others
         } else {
-            self.firm = firm;
             components
         }
     }
