@@ -54,7 +54,7 @@ fn all_effects() -> Vec<String> {
 }
 
 crate::stage! {
-    Identify, "identify", 21, "identifies geometry, transmission and compliance from the nominal robot in one estimation",
+    Identify, "identify", 22, "identifies geometry, transmission and compliance from the nominal robot in one estimation",
         IdentifyReads {
             robot: Robot,
             recording: Recording,
@@ -354,7 +354,7 @@ crate::identified::identification! {
 }
 
 crate::stage! {
-    Stiffness, "stiffness", 20, "identifies joint compliance from loaded poses; everything identified before is kept",
+    Stiffness, "stiffness", 21, "identifies joint compliance from loaded poses; everything identified before is kept",
         StiffnessReads {
             robot: Robot,
             recording: Recording,

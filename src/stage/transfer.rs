@@ -24,7 +24,7 @@ crate::identified::identification! {
 }
 
 crate::stage! {
-    Transfer, "transfer", 17, "tests an identified model on another recording of the robot; only its base is estimated anew",
+    Transfer, "transfer", 18, "tests an identified model on another recording of the robot; only its base is estimated anew",
         TransferReads {
             robot: Robot,
             recording: Recording,

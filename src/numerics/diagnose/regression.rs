@@ -3,9 +3,9 @@
 
 use crate::criteria::search::{IDLE, LEVELS};
 use crate::effect::{Form, Survey};
-use crate::linear::{dot, project, scale, subtract};
+use crate::linear::{dot, product, project, scale, subtract, view};
 use crate::whitened::WhitenedProblem;
-use faer::Mat;
+use faer::{Mat, MatRef};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -26,7 +26,7 @@ pub(super) struct FormRegression<'p, 'a> {
 /// What a model can absorb of some numbers a column, and what it leaves of the residual.
 struct ModelledRows {
     /// Columns of an orthonormal basis.
-    basis: Vec<Vec<f64>>,
+    basis: DMatrix<f64>,
     residual: Vec<f64>,
     /// Of laws of a joint's travel, one number for each row of the recording: the square of what a unit travel does there.
     square: Option<Vec<f64>>,
@@ -52,23 +52,32 @@ impl<'p, 'a> FormRegression<'p, 'a> {
     ) -> Self {
         let mut residual = residual.to_vec();
         project(base.as_ref(), &mut residual);
-        let mut basis: Vec<Vec<f64>> = (0..base.ncols())
-            .map(|j| base.col_as_slice(j).to_vec())
+        let count = residual.len();
+        let mut basis: Vec<f64> = (0..base.ncols())
+            .flat_map(|j| base.col_as_slice(j).iter().copied())
             .collect();
         let columns: Vec<f64> = forms
             .iter()
             .flat_map(|form| problem.columns(form))
             .collect();
-        for column in columns.chunks(residual.len().max(1)) {
+        for column in columns.chunks(count.max(1)) {
             let mut column = column.to_vec();
             scale(&mut column);
             // Twice: what rounding leaves of a long basis.
-            (0..2).for_each(|_| basis.iter().for_each(|other| subtract(&mut column, other)));
+            for _ in 0..2 {
+                let known = basis.len() / count;
+                project(
+                    MatRef::from_column_major_slice(&basis, count, known),
+                    &mut column,
+                );
+            }
             if scale(&mut column).powi(2) > INVISIBLE {
                 subtract(&mut residual, &column);
-                basis.push(column);
+                basis.extend(column);
             }
         }
+        let known = basis.len() / count.max(1);
+        let basis = DMatrix::from_vec(count, known, basis);
         let travels = (0..problem.robot.joints())
             .map(|_| OnceLock::new())
             .collect();
@@ -126,8 +135,15 @@ impl<'p, 'a> FormRegression<'p, 'a> {
 
     fn along(&self, joint: usize) -> ModelledRows {
         let along = |column: &[f64]| self.problem.along_travel(joint, column);
+        let basis = &self.rows.basis;
+        let columns: Vec<f64> = basis
+            .as_slice()
+            .chunks(basis.nrows().max(1))
+            .flat_map(along)
+            .collect();
+        let rows = columns.len() / basis.ncols().max(1);
         ModelledRows {
-            basis: self.rows.basis.iter().map(|column| along(column)).collect(),
+            basis: DMatrix::from_vec(rows, basis.ncols(), columns),
             residual: along(&self.rows.residual),
             square: Some(along(self.problem.unit_travel(joint))),
         }
@@ -154,15 +170,17 @@ impl ModelledRows {
             })
             .collect();
         let columns: Vec<&[f64]> = stacked.chunks(rows).collect();
-        let absorbed: Vec<Vec<f64>> = columns
-            .iter()
-            .map(|column| self.basis.iter().map(|other| dot(other, column)).collect())
-            .collect();
+        let absorbed = product(
+            view(&self.basis),
+            MatRef::from_column_major_slice(&stacked, rows, columns.len()),
+        );
+        let absorbed =
+            |k: usize| &absorbed.as_slice()[k * self.basis.ncols()..(k + 1) * self.basis.ncols()];
         let mut gram = DMatrix::zeros(columns.len(), columns.len());
         for (i, column) in columns.iter().enumerate() {
             let weighed = weighed(column);
             for j in 0..=i {
-                gram[(i, j)] = dot(&weighed, columns[j]) - dot(&absorbed[i], &absorbed[j]);
+                gram[(i, j)] = dot(&weighed, columns[j]) - dot(absorbed(i), absorbed(j));
                 gram[(j, i)] = gram[(i, j)];
             }
         }
@@ -212,7 +230,7 @@ mod tests {
         let mut residual = y.clone();
         subtract(&mut residual, &a);
         let rows = ModelledRows {
-            basis: vec![a],
+            basis: DMatrix::from_vec(9, 1, a),
             residual: residual.clone(),
             square: None,
         };

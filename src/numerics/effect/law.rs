@@ -135,6 +135,9 @@ impl Factor {
     }
 }
 
+/// Functions of a second factor that are kept while those of the first are gone through.
+const INNER: usize = 48;
+
 /// Parts of each variable's range in which pairs of values are counted.
 const PARTS: usize = 8;
 
@@ -371,6 +374,16 @@ impl Law {
                 let nearest = self.nearest(robot, state);
                 let [of_first, of_times] = [0, 1].map(|k| nearest.map(|nearest| nearest[k]));
                 let inner = times.count();
+                // The functions of one factor once, not once for each of the other's.
+                let mut of_inner = [0.0; INNER];
+                if let Some(of_inner) = of_inner.get_mut(..inner) {
+                    times.values(robot, state, of_times, &mut |k, y| of_inner[k] = y);
+                    self.first.values(robot, state, of_first, &mut |i, x| {
+                        let values = of_inner.iter().enumerate();
+                        values.for_each(|(k, y)| each(inner * i + k, x * y));
+                    });
+                    return;
+                }
                 self.first.values(robot, state, of_first, &mut |i, x| {
                     times.values(robot, state, of_times, &mut |k, y| {
                         each(inner * i + k, x * y)

@@ -9,7 +9,7 @@
 //! (Q'r - G'e). Of a part only its own triangular factor is kept, which has the same G'G and G'e.
 
 use crate::estimate::contacts::{less, without_places};
-use crate::estimate::factor::TriangularFactor;
+use crate::estimate::factor::{TriangularFactor, axpy, dot, norm};
 use crate::estimate::fit::{Session, fit};
 use crate::estimate::model::Model;
 use crate::estimate::problem::{ObservationTerm, Problem, share};
@@ -370,7 +370,10 @@ impl<'a> NearbyFits<'a> {
             open,
         } = whole_fit;
         let p = open.len();
-        let upper_factor = Mat::from_fn(p, p, |i, j| if i <= j { factor.entry(i, j) } else { 0.0 });
+        let mut upper_factor = Mat::zeros(p, p);
+        for j in 0..p {
+            upper_factor.col_as_slice_mut(j)[..=j].copy_from_slice(factor.column(j));
+        }
         let (mut seen, mut left) = (Mat::zeros(p, p), Mat::identity(p, p));
         let (upper, lower) = (
             BlockStructure::TriangularUpper,
@@ -403,24 +406,21 @@ impl<'a> NearbyFits<'a> {
         if pivots.any(|pivot| pivot * pivot < LEFT) {
             return None;
         }
-        let errors: Vec<f64> = (0..=p).map(|i| factor.entry(i, p)).collect();
-        let gradient = |j: usize| {
-            errors
-                .iter()
-                .zip(seen.col_as_slice(j))
-                .map(|(error, seen)| error * seen)
-                .sum::<f64>()
-        };
+        let errors = factor.column(p);
+        let gradient = |j: usize| dot(&errors[..=j], &seen.col_as_slice(j)[..=j]);
         let along = left.solve(&Mat::from_fn(p, 1, |j, _| whole.entry(j, p) - gradient(j)));
         let along = along.col_as_slice(0);
-        let mut other = model.clone();
-        for (i, parameter) in open.iter().enumerate() {
-            other.x[*parameter] += (i..p).map(|j| inverse[(i, j)] * along[j]).sum::<f64>();
+        // Column by column, as they are stored.
+        let (mut step, mut ahead) = (vec![0.0; p], errors.to_vec());
+        for (j, by) in along.iter().enumerate() {
+            axpy(*by, &inverse.col_as_slice(j)[..=j], &mut step[..=j]);
+            axpy(-by, &seen.col_as_slice(j)[..=j], &mut ahead[..=j]);
         }
-        let ahead =
-            (0..p).map(|i| errors[i] - (0..p).map(|j| seen[(i, j)] * along[j]).sum::<f64>());
-        let straight =
-            (ahead.map(|error| error * error).sum::<f64>() + errors[p] * errors[p]).sqrt();
+        let mut other = model.clone();
+        for (parameter, step) in open.iter().zip(&step) {
+            other.x[*parameter] += step;
+        }
+        let straight = norm(&ahead);
         let (lengths, arrived) = self.arrive(part, &other);
         ((arrived - straight).abs() <= STRAIGHT * straight).then_some(lengths)
     }

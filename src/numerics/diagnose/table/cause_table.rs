@@ -268,7 +268,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
     }
 
     pub(crate) fn state(&self, components: &[Component], kappa: Option<f64>) -> KnownState {
-        self.parts.know(components, self.frame);
+        self.parts.know(components.iter(), self.frame);
         KnownState::of(components.to_vec(), &self.parts, self.frame, kappa)
     }
 }

@@ -172,6 +172,15 @@ impl FreeShape {
             .collect()
     }
 
+    /// Whether the numbers of its variables are those of another one but for rounding.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        let over = match (self.over, other.over) {
+            (Over::Product(a), Over::Product(b)) => same_numbers(a, b),
+            (a, b) => a == b,
+        };
+        over && self.motion == other.motion && same_numbers(self.variable, other.variable)
+    }
+
     pub(super) fn is_product(&self) -> bool {
         matches!(self.over, Over::Product(_))
     }
@@ -350,6 +359,23 @@ pub(super) fn is_square(a: Variable, b: Variable) -> bool {
         | (Variable::Sighted { along: a }, Variable::Sighted { along: b }) => {
             Vector3::from(a).dot(&Vector3::from(b)).abs() > *ONE_DIRECTION
         }
+        _ => a == b || a.is_alike(b),
+    }
+}
+
+/// Whether two variables are one but for rounding.
+fn same_numbers(a: Variable, b: Variable) -> bool {
+    let same = |a: f64, b: f64| (a - b).abs() <= 1e-9 * a.abs();
+    let one = |a: [f64; 3], b: [f64; 3]| (Vector3::from(a) - Vector3::from(b)).norm() < 1e-9;
+    match (a, b) {
+        (Variable::Recent { time: a, .. }, Variable::Recent { time: b, .. })
+        | (Variable::Stretch { limit: a, .. }, Variable::Stretch { limit: b, .. })
+            if !same(a, b) =>
+        {
+            false
+        }
+        (Variable::Position { along: a }, Variable::Position { along: b })
+        | (Variable::Sighted { along: a }, Variable::Sighted { along: b }) => one(a, b),
         _ => a == b || a.is_alike(b),
     }
 }

@@ -78,7 +78,7 @@ impl CauseTable<'_, '_> {
         }
         let of_motions: Vec<Vec<usize>> = of_motions.into_values().collect();
         let of_motion = |cells: &Vec<usize>| {
-            let columns = self.frame.multiplied(&component.values);
+            let columns = self.frame.multiplied(vec![&component.values]);
             let blocks: Vec<_> = cells.iter().map(|cell| &self.coarse[*cell]).collect();
             let products = self.known.of_each(component, &columns, &blocks, self.frame);
             let products = products.iter().map(|product| component.by_part(product));
@@ -137,7 +137,7 @@ impl CauseTable<'_, '_> {
     /// L^-1 Z'X of a block given a state.
     pub(crate) fn across_block(&self, block: &CellColumns, state: &KnownState) -> DMatrix<f64> {
         let part = |component: &Component| {
-            let columns = self.frame.multiplied(&component.values);
+            let columns = self.frame.multiplied(vec![&component.values]);
             let known = &self.known;
             let products = known.of_each(component, &columns, &[block], self.frame);
             component.by_part(&products[0])
@@ -165,7 +165,7 @@ impl CauseTable<'_, '_> {
         let Some(weights) = state.weights() else {
             return Vec::new();
         };
-        let motion = &*component.part * &weights;
+        let motion = &**component.part * &weights;
         let length = motion.norm().max(f64::MIN_POSITIVE);
         let cells: Vec<usize> = (0..self.cells.len()).collect();
         let known = self.part_of_cells(component, &cells);

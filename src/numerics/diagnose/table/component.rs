@@ -152,7 +152,7 @@ impl CellColumns {
     pub(crate) fn products(&self, with: &MultipliedColumns, frame: &SearchRows) -> DMatrix<f64> {
         match &self.factored {
             Some(factored) => frame.with_factored(with, &factored.iter().collect::<Vec<_>>()),
-            None => product(view(with.columns), view(self.values(frame))),
+            None => with.times(self.values(frame)),
         }
     }
 
@@ -222,7 +222,7 @@ pub(super) struct Component {
     /// Rms motion at the tool, m.
     pub(crate) amplitude: f64,
     /// Columns whose products with themselves are its part in the covariance: the directions that the rows could show.
-    pub(crate) part: Arc<DMatrix<f64>>,
+    pub(crate) part: Arc<Columns>,
     /// What makes these of its columns.
     pub(crate) mix: Arc<DMatrix<f64>>,
 }
@@ -270,7 +270,7 @@ impl Component {
         matmul(out, Accum::Replace, values, by, 1.0, Par::Seq);
         Self {
             id,
-            part: Arc::new(part),
+            part: Arc::new(part.into()),
             mix: Arc::new(mix),
             ..self
         }
@@ -379,7 +379,12 @@ struct PartCache {
 
 impl PartProducts {
     /// Computes what is missing for some components, and forgets what is too much.
-    pub(crate) fn know(&self, components: &[Component], frame: &SearchRows) {
+    pub(crate) fn know<'c>(
+        &self,
+        components: impl Iterator<Item = &'c Component>,
+        frame: &SearchRows,
+    ) {
+        let components: Vec<&Component> = components.collect();
         let Ok(mut cache) = self.0.write() else {
             return;
         };
@@ -397,7 +402,33 @@ impl PartProducts {
         }
     }
 
-    /// The Gram matrix of components, and their products with the residual.
+    /// The Gram matrix of a component's part, its products with the residual, and with the parts of others, one after another; none where they
+    /// are not known.
+    pub(super) fn beside(
+        &self,
+        component: &Component,
+        others: &[Component],
+    ) -> Option<(DMatrix<f64>, DVector<f64>, DMatrix<f64>)> {
+        let cache = self.0.read().ok()?;
+        let gram = cache.pairs.get(&(component.id, component.id))?;
+        let along = cache.along.get(&component.id)?;
+        let rows = others.iter().map(|other| other.part.ncols()).sum();
+        let mut across = DMatrix::zeros(rows, component.part.ncols());
+        let mut first = 0;
+        for other in others {
+            let [later, earlier] = [component.id.max(other.id), component.id.min(other.id)];
+            let known = cache.pairs.get(&(later, earlier))?;
+            let mut block = across.rows_mut(first, other.part.ncols());
+            match later == component.id {
+                true => block.tr_copy_from(known),
+                false => block.copy_from(known),
+            }
+            first += other.part.ncols();
+        }
+        Some(((**gram).clone(), (**along).clone(), across))
+    }
+
+    /// The Gram matrix of components, its lower triangle, and their products with the residual.
     pub(super) fn of(&self, components: &[Component]) -> (DMatrix<f64>, DVector<f64>) {
         let count: usize = components.iter().map(|one| one.part.ncols()).sum();
         let (mut gram, mut along) = (DMatrix::zeros(count, count), DVector::zeros(count));
@@ -414,14 +445,11 @@ impl PartProducts {
             for b in &components[..=i] {
                 let columns = b.part.ncols();
                 if let Some(known) = cache.pairs.get(&(a.id.max(b.id), a.id.min(b.id))) {
-                    let [block, transposed] = match a.id >= b.id {
-                        true => [(**known).clone(), known.transpose()],
-                        false => [known.transpose(), (**known).clone()],
-                    };
-                    let mut above = gram.view_mut((across, down), (columns, rows));
-                    above.copy_from(&transposed);
                     let mut below = gram.view_mut((down, across), (rows, columns));
-                    below.copy_from(&block);
+                    match a.id >= b.id {
+                        true => below.copy_from(known),
+                        false => below.tr_copy_from(known),
+                    }
                 }
                 across += columns;
             }

@@ -30,18 +30,12 @@ pub(super) struct MotionRows {
     by_each_other: Vec<Vec<f64>>,
 }
 
-/// Functions at every row, rows x functions, and their squares.
+/// Functions at every row, rows x functions.
 pub(super) struct Functions {
     pub(super) values: DMatrix<f64>,
-    pub(super) squares: DMatrix<f64>,
 }
 
 impl Functions {
-    pub(super) fn of(values: DMatrix<f64>) -> Self {
-        let squares = values.map(|value| value * value);
-        Self { values, squares }
-    }
-
     pub(super) fn count(&self) -> usize {
         self.values.ncols()
     }
@@ -98,22 +92,28 @@ impl MotionRows {
                 .collect::<Vec<_>>()
         };
         Self {
-            by_base: self.with(base, row_of),
+            by_base: self.with(&[base], row_of),
             by_residual: all.iter().map(|one| along(one, residual)).collect(),
             by_each_other: all.iter().flat_map(with_each).collect(),
             ..self
         }
     }
 
-    /// Products of each direction with columns (columns x residual rows) row by row, columns x rows.
-    pub(super) fn with(&self, columns: &DMatrix<f64>, row_of: &[usize]) -> Vec<DMatrix<f64>> {
-        let count = columns.nrows();
+    /// Products of each direction with blocks of columns (columns x residual rows) row by row, columns x rows.
+    pub(super) fn with(&self, blocks: &[&DMatrix<f64>], row_of: &[usize]) -> Vec<DMatrix<f64>> {
+        let count: usize = blocks.iter().map(|block| block.nrows()).sum();
         let row_products = |direction: &WeighedDirection| {
             let mut out = DMatrix::zeros(count, direction.square.len());
-            for ((line, row), by) in row_of.iter().enumerate().zip(&direction.weighed) {
-                let sums = &mut out.as_mut_slice()[row * count..(row + 1) * count];
-                let each = sums.iter_mut().zip(column(columns, line));
-                each.for_each(|(sum, value)| *sum += by * value);
+            let mut first = 0;
+            for block in blocks {
+                let size = block.nrows();
+                for ((line, row), by) in row_of.iter().enumerate().zip(&direction.weighed) {
+                    let from = row * count + first;
+                    let sums = &mut out.as_mut_slice()[from..from + size];
+                    let each = sums.iter_mut().zip(column(block, line));
+                    each.for_each(|(sum, value)| *sum += by * value);
+                }
+                first += size;
             }
             out
         };
@@ -183,8 +183,7 @@ impl FactoredColumns {
     pub(super) fn of(motion: usize, rows: &MotionRows, functions: Arc<Functions>) -> Self {
         let (mut columns, mut square) = (Vec::new(), Vec::new());
         for (direction, function) in pairs(rows.motion, rows.directions.len(), functions.count()) {
-            let square_of = column(&functions.squares, function);
-            let length = dot(square_of, &rows.directions[direction].square);
+            let length = weighed_square(functions.at(function), &rows.directions[direction].square);
             columns.push((direction, function, unit(length)));
             square.push(length);
         }
@@ -262,6 +261,24 @@ fn pairs(
             (k / functions, k % functions)
         }
     })
+}
+
+/// The sum of squares, each by its weight.
+fn weighed_square(values: &[f64], weights: &[f64]) -> f64 {
+    // Four sums: the compiler may not reorder one.
+    let ((values, last), (weights, by)) = (values.as_chunks::<4>(), weights.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (values, weights) in values.iter().zip(weights) {
+        for lane in 0..4 {
+            sums[lane] += values[lane] * values[lane] * weights[lane];
+        }
+    }
+    let last: f64 = last
+        .iter()
+        .zip(by)
+        .map(|(value, by)| value * value * by)
+        .sum();
+    sums[0] + sums[1] + sums[2] + sums[3] + last
 }
 
 /// What makes a motion of this mean square one of unit size; 0 of none.

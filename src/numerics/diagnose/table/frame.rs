@@ -6,7 +6,7 @@ use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, 
 use super::noise_shape::NoiseShape;
 use crate::diagnose::round::RoundView;
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
-use crate::linear::{Columns, product, project, shown_directions};
+use crate::linear::{self, Columns, product, project, shown_directions, view};
 use faer::{Mat, MatRef};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -23,8 +23,32 @@ pub(super) struct UnitColumns {
 
 /// Columns with their products with the directions of each motion, row by row, each computed once.
 pub(super) struct MultipliedColumns<'c> {
-    pub(super) columns: &'c Columns,
+    /// One block after another.
+    blocks: Vec<&'c Columns>,
     by_row: Vec<OnceLock<Vec<DMatrix<f64>>>>,
+}
+
+impl MultipliedColumns<'_> {
+    fn count(&self) -> usize {
+        self.blocks.iter().map(|block| block.ncols()).sum()
+    }
+
+    /// Of each block its columns x lines.
+    fn by_line(&self) -> Vec<&DMatrix<f64>> {
+        self.blocks.iter().map(|block| block.by_line()).collect()
+    }
+
+    /// The transpose of these columns times others that are written down.
+    pub(super) fn times(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(self.count(), columns.ncols());
+        let mut first = 0;
+        for block in &self.blocks {
+            let products = linear::product(view(block), view(columns));
+            out.rows_mut(first, block.ncols()).copy_from(&products);
+            first += block.ncols();
+        }
+        out
+    }
 }
 
 /// A variable at every row, none where some row does not tell it; and functions of it.
@@ -164,7 +188,7 @@ impl<'a> SearchRows<'a> {
             if functions.all(|(basis, _)| *basis != factor.basis)
                 && let Some(fresh) = self.factor(factor)
             {
-                let fresh = Arc::new(Functions::of(fresh));
+                let fresh = Arc::new(Functions { values: fresh });
                 self.variables[known].functions.push((factor.basis, fresh));
             }
         }
@@ -209,9 +233,9 @@ impl<'a> SearchRows<'a> {
     }
 
     /// Some columns, of which the base is projected off, to be multiplied with factored ones.
-    pub(crate) fn multiplied<'c>(&self, columns: &'c Columns) -> MultipliedColumns<'c> {
+    pub(crate) fn multiplied<'c>(&self, blocks: Vec<&'c Columns>) -> MultipliedColumns<'c> {
         MultipliedColumns {
-            columns,
+            blocks,
             by_row: self.motions.iter().map(|_| OnceLock::new()).collect(),
         }
     }
@@ -227,11 +251,11 @@ impl<'a> SearchRows<'a> {
         for forms in factored.chunk_by(|a, b| a.motion == b.motion) {
             let motion = forms[0].motion;
             let by_row = with.by_row[motion]
-                .get_or_init(|| self.motions[motion].with(with.columns.by_line(), row_of));
+                .get_or_init(|| self.motions[motion].with(&with.by_line(), row_of));
             out.append(&mut sums(forms, by_row));
         }
-        let count = out.len() / with.columns.ncols().max(1);
-        DMatrix::from_vec(with.columns.ncols(), count, out)
+        let count = out.len() / with.count().max(1);
+        DMatrix::from_vec(with.count(), count, out)
     }
 
     /// Products of factored columns with each other and with the residual, the base projected off; none of several motions.
@@ -387,14 +411,18 @@ impl<'a> SearchRows<'a> {
         };
         let first = factor(&law.first)?;
         let Some(times) = law.times.as_ref() else {
-            return Some(Arc::new(Functions::of(first.into_owned())));
+            return Some(Arc::new(Functions {
+                values: first.into_owned(),
+            }));
         };
         let second = factor(times)?;
         let products: Vec<DVector<f64>> = first
             .column_iter()
             .flat_map(|a| second.column_iter().map(move |b| a.component_mul(&b)))
             .collect();
-        Some(Arc::new(Functions::of(DMatrix::from_columns(&products))))
+        Some(Arc::new(Functions {
+            values: DMatrix::from_columns(&products),
+        }))
     }
 
     /// The functions of one variable at every row, rows x functions.

@@ -2,7 +2,6 @@
 
 use super::cause_table::CauseTable;
 use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
-use super::component::CellColumns;
 use super::scan::{CellEvidence, CellScan, Refined};
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, CLOSELY, LEVELS, SEPARATED, STICKS};
@@ -116,24 +115,18 @@ impl CauseTable<'_, '_> {
         state: &KnownState,
         is_worth: &dyn Fn(f64) -> bool,
     ) -> Option<Refined> {
-        let best = self.as_found(cell, found);
+        let best = self.shape_found(cell, found);
         // All of these are of one motion: what its directions have in common with the state is computed once.
-        let columns = self.frame.multiplied(state.columns(self.frame));
+        let columns = state.columns(self.frame);
         let value = |forms: &[Form]| {
             let group = ShapeGroup {
                 forms: forms.to_vec(),
-                shapes: vec![best.shape.clone()],
-                positive: best.positive,
-                largest: best.largest,
+                ..best.clone()
             };
-            let block = CellColumns::of(vec![group], self.frame);
-            // With other numbers a variable may have so few values that its curve has fewer columns.
-            let is_alike = block.count() == best.shape.shares.len();
-            is_alike
-                .then(|| self.evidence_once(&block, state, &columns))
-                .flatten()
+            self.shape_evidence(group, state, &columns)
         };
-        let start = self.component_evidence(&best, state)?;
+        // Nothing to climb from is computed before there is somewhere to climb to.
+        let start = || value(&best.forms);
         let found_as = |forms, (log, amplitude): ShapeEvidence| Refined {
             forms,
             shape: None,
@@ -153,7 +146,10 @@ impl CauseTable<'_, '_> {
                         .collect::<Vec<_>>()
                 };
                 // The numbers of components first.
-                let (mut first, mut start, mut moved) = (*free, start, false);
+                if has_no_numbers(free, &self.numbers) {
+                    return None;
+                }
+                let (mut first, mut start, mut moved) = (*free, start()?, false);
                 let known = self.numbers.iter().filter(|variable| {
                     free.variable.is_alike(**variable) && **variable != free.variable
                 });
@@ -167,7 +163,14 @@ impl CauseTable<'_, '_> {
                     }
                 }
                 let near = |free: &FreeShape, level| with_forms(free.near(level));
-                let climbed = climb((first, start), &near, &value, &|_, _| 0.0, is_worth);
+                let rules = Climb {
+                    near: &near,
+                    value: &value,
+                    price: &|_, _| 0.0,
+                    is_same: &FreeShape::is_same,
+                    is_worth,
+                };
+                let climbed = rules.from(first, start);
                 let (free, evidence) = climbed.or(moved.then_some((first, start)))?;
                 Some(found_as(forms_of(&free)?, evidence))
             }
@@ -185,8 +188,17 @@ impl CauseTable<'_, '_> {
                         0.0
                     }
                 };
-                let first = (form.clone(), start);
-                let (form, evidence) = climb(first, &near, &value, &price, is_worth)?;
+                let rules = Climb {
+                    near: &near,
+                    value: &value,
+                    price: &price,
+                    is_same: &|a, b| a == b,
+                    is_worth,
+                };
+                if (0..*LEVELS).all(|level| near(form, level).is_empty()) {
+                    return None;
+                }
+                let (form, evidence) = rules.from(form.clone(), start()?)?;
                 Some(found_as(vec![form], evidence))
             }
             _ => None,
@@ -230,38 +242,67 @@ fn forms_of(group: &ShapeGroup, shape: usize) -> Option<Vec<Form>> {
     Some(out)
 }
 
-/// Steps from a shape to the best near it, in steps that halve, until none is better: the last with ln of its evidence and its amplitude, none
-/// if that is the first. `price` is what a step costs; steps become smaller while ln of the evidence `is_worth` it.
-fn climb<T: Clone>(
-    (first, start): (T, ShapeEvidence),
-    near: &dyn Fn(&T, i32) -> Vec<Variant<T>>,
-    value: &dyn Fn(&[Form]) -> Option<ShapeEvidence>,
-    price: &dyn Fn(&T, &T) -> f64,
-    is_worth: &dyn Fn(f64) -> bool,
-) -> Option<(T, ShapeEvidence)> {
-    let (mut now, mut evidence, mut moved) = (first, start, false);
-    for level in 0..*LEVELS {
-        if level > 0 && !is_worth(evidence.0) {
-            break;
-        }
-        loop {
-            let tried = near(&now, level).into_iter();
-            let tried = tried.filter_map(|(other, forms)| Some((value(&forms)?, other)));
-            let paid = |((log, _), other): &(ShapeEvidence, T)| log - price(&now, other);
-            let Some(next) = tried.max_by(|a, b| paid(a).total_cmp(&paid(b))) else {
-                break;
-            };
-            if paid(&next) <= evidence.0 + 1e-6 {
+/// How a shape is stepped from to better ones near it.
+struct Climb<'c, T> {
+    near: &'c dyn Fn(&T, i32) -> Vec<Variant<T>>,
+    value: &'c dyn Fn(&[Form]) -> Option<ShapeEvidence>,
+    /// What a step costs.
+    price: &'c dyn Fn(&T, &T) -> f64,
+    is_same: &'c dyn Fn(&T, &T) -> bool,
+    /// Steps become smaller while ln of the evidence is worth it.
+    is_worth: &'c dyn Fn(f64) -> bool,
+}
+
+impl<T: Clone> Climb<'_, T> {
+    /// Steps to the best near, in steps that halve, until none is better: the last with ln of its evidence and its amplitude, none if that is
+    /// the first.
+    fn from(&self, first: T, start: ShapeEvidence) -> Option<(T, ShapeEvidence)> {
+        // A step back, or a half step on towards where a whole one led, has been asked before.
+        let mut known: Vec<(T, Option<ShapeEvidence>)> = vec![(first.clone(), Some(start))];
+        let (mut now, mut evidence, mut moved) = (first, start, false);
+        for level in 0..*LEVELS {
+            if level > 0 && !(self.is_worth)(evidence.0) {
                 break;
             }
-            let gained = next.0.0 - evidence.0;
-            (evidence, now, moved) = (next.0, next.1, true);
-            if gained < 0.05 {
-                break;
+            loop {
+                let mut tried: Vec<(ShapeEvidence, T)> = Vec::new();
+                for (other, forms) in (self.near)(&now, level) {
+                    let asked = known
+                        .iter()
+                        .find(|(known, _)| (self.is_same)(known, &other));
+                    let found = match asked {
+                        Some((_, found)) => *found,
+                        None => {
+                            let found = (self.value)(&forms);
+                            known.push((other.clone(), found));
+                            found
+                        }
+                    };
+                    tried.extend(found.map(|found| (found, other)));
+                }
+                let paid = |((log, _), other): &(ShapeEvidence, T)| log - (self.price)(&now, other);
+                let best = tried.into_iter().max_by(|a, b| paid(a).total_cmp(&paid(b)));
+                let Some(next) = best else {
+                    break;
+                };
+                if paid(&next) <= evidence.0 + 1e-6 {
+                    break;
+                }
+                let gained = next.0.0 - evidence.0;
+                (evidence, now, moved) = (next.0, next.1, true);
+                if gained < 0.05 {
+                    break;
+                }
             }
         }
+        moved.then_some((now, evidence))
     }
-    moved.then_some((now, evidence))
+}
+
+/// Whether a motion over a variable has no numbers, nor any of components that it may take.
+fn has_no_numbers(free: &FreeShape, numbers: &[Variable]) -> bool {
+    let is_alike = |other: &Variable| free.variable.is_alike(*other) && *other != free.variable;
+    free.near(0).is_empty() && !numbers.iter().any(is_alike)
 }
 
 /// Whether a form is a wave of whole periods a turn.

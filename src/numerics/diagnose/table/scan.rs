@@ -1,7 +1,7 @@
 //! What each cell says given the components of a model.
 
 use super::cause_table::CauseTable;
-use super::cell::{CellShape, FreeShape};
+use super::cell::{CellShape, FreeShape, ShapeGroup};
 use super::component::{CellColumns, Component, shape_keys};
 use super::evidence::{GroupEvidence, log_sum};
 use super::frame::MultipliedColumns;
@@ -278,13 +278,18 @@ impl CauseTable<'_, '_> {
         }
         let moved = |form: &Form| Some(free.term(*form.term()?.law()));
         let forms: Vec<Form> = component.forms.iter().map(moved).collect::<Option<_>>()?;
-        let moved = self.with_forms(component, forms);
-        let is_other =
-            moved.values.ncols() != component.values.ncols() || state.has_any(&moved.forms);
-        let evidence = (!is_other).then(|| self.component_evidence(&moved, state));
-        let (log, amplitude) = evidence.flatten()?;
+        if state.has_any(&forms) {
+            return None;
+        }
+        let group = ShapeGroup {
+            forms: forms.clone(),
+            shapes: vec![component.shape.clone()],
+            positive: component.positive,
+            largest: component.largest,
+        };
+        let (log, amplitude) = self.shape_evidence(group, state, &state.columns(self.frame))?;
         Some(Refined {
-            forms: moved.forms,
+            forms,
             shape: Some(component.shape.clone()),
             log,
             amplitude,
@@ -293,7 +298,7 @@ impl CauseTable<'_, '_> {
 
     /// Those of some products that a state shows, the most probable first.
     pub(crate) fn seen_pairs(&self, pairs: &[FreeShape], state: &KnownState) -> Vec<FreeShape> {
-        let columns = self.frame.multiplied(state.columns(self.frame));
+        let columns = state.columns(self.frame);
         let log = |free: &FreeShape| {
             let block = CellColumns::of(self.groups(free, false), self.frame);
             let across = self.across_once(&block, state, &columns);
@@ -337,44 +342,47 @@ impl CauseTable<'_, '_> {
         component.with_part(self.next)
     }
 
-    /// The same with the numbers of its listed shape; it has no part in the covariance yet.
-    pub(crate) fn as_found(&self, cell: usize, found: &CellEvidence) -> Component {
-        let block = self.fine(cell);
-        let seen = &block.groups[found.shape.0];
-        let shape = seen.group.shapes[found.shape.1].clone();
-        // Forms that this shape leaves out.
-        let mut at = 0;
-        let (mut forms, mut counts, mut kept) = (Vec::new(), Vec::new(), Vec::new());
+    /// The shape of a cell with the numbers of its listed shape, alone in its group, less the forms that it leaves out.
+    pub(crate) fn shape_found(&self, cell: usize, found: &CellEvidence) -> ShapeGroup {
+        let seen = &self.fine(cell).groups[found.shape.0];
+        let shape = &seen.group.shapes[found.shape.1];
+        let (mut at, mut forms, mut shares) = (0, Vec::new(), Vec::new());
         for (form, count) in seen.group.forms.iter().zip(&seen.counts) {
-            let columns = at..at + count;
+            let of_form = &shape.shares[at..at + count];
             at += count;
-            if shape.shares[columns.clone()]
-                .iter()
-                .any(|share| *share > 0.0)
-            {
+            if of_form.iter().any(|share| *share > 0.0) {
                 forms.push(form.clone());
-                counts.push(*count);
-                kept.extend(columns);
+                shares.extend_from_slice(of_form);
             }
         }
-        let columns: Vec<usize> = kept.iter().map(|k| seen.range.start + k).collect();
-        let values = block.values(self.frame).select_columns(&columns);
         let shape = CellShape {
-            shares: kept.iter().map(|k| shape.shares[*k]).collect(),
-            ..shape
+            shares,
+            ..shape.clone()
         };
+        ShapeGroup {
+            forms,
+            shapes: vec![shape],
+            positive: seen.group.positive,
+            largest: seen.group.largest,
+        }
+    }
+
+    /// The same as a component; it has no part in the covariance yet.
+    pub(super) fn as_found(&self, cell: usize, found: &CellEvidence) -> Component {
+        let mut group = self.shape_found(cell, found);
+        let (columns, counts) = self.frame.columns(&group.forms);
         Component {
             id: 0,
             cell,
-            forms,
+            forms: group.forms,
             counts,
-            shape,
-            positive: seen.group.positive,
-            largest: seen.group.largest,
-            values: Arc::new(values.into()),
-            square: Arc::new(columns.iter().map(|k| block.square[*k]).collect()),
+            shape: group.shapes.remove(0),
+            positive: group.positive,
+            largest: group.largest,
+            values: columns.values,
+            square: Arc::new(columns.square),
             amplitude: found.amplitude,
-            part: Arc::default(),
+            part: Arc::new(DMatrix::default().into()),
             mix: Arc::default(),
         }
     }
@@ -400,26 +408,32 @@ impl CauseTable<'_, '_> {
         })
     }
 
-    /// ln of the evidence of one shape with its weight given a state, and its amplitude.
+    /// ln of the evidence of a component's shape with its weight given a state, and its amplitude.
     pub(crate) fn component_evidence(
         &self,
         component: &Component,
         state: &KnownState,
     ) -> Option<(f64, f64)> {
-        let block = CellColumns::of_component(component, self.frame);
-        let columns = self.frame.multiplied(state.columns(self.frame));
-        self.evidence_once(&block, state, &columns)
+        let all = state.components.iter().chain([component]);
+        self.parts.know(all, self.frame);
+        state.component_evidence(component, &self.parts)
     }
 
-    /// The same of a block of one shape that is asked once.
-    pub(super) fn evidence_once(
+    /// The same of one shape, alone in its group, by the columns of the state; none where its forms have other columns than it has shares: with
+    /// other numbers a variable may have so few values that its curve has fewer.
+    pub(super) fn shape_evidence(
         &self,
-        block: &CellColumns,
+        group: ShapeGroup,
         state: &KnownState,
         columns: &MultipliedColumns,
     ) -> Option<(f64, f64)> {
-        let across = self.across_once(block, state, columns);
-        let (.., found) = state.shapes(block, &across, 0).pop()?;
+        let block = CellColumns::of(vec![group], self.frame);
+        let shape = &block.groups[0].group.shapes[0];
+        if block.count() != shape.shares.len() {
+            return None;
+        }
+        let across = self.across_once(&block, state, columns);
+        let (.., found) = state.shapes(&block, &across, 0).pop()?;
         Some((found.log, found.amplitude))
     }
 }

@@ -1,13 +1,13 @@
 //! The search for the cells that the rows show: forward, exchange, drop, each by the evidence of a cell given all others.
 
 use super::cause_table::CauseTable;
-use super::cell::{FreeShape, Over};
+use super::cell::{CellShape, FreeShape, Over};
 use super::component::Component;
 use super::evidence::AMPLITUDES;
 use super::state::KnownState;
 use crate::criteria::cells::{
-    ALIKE, BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, JOINS, LEAVES, LIKELY, NEARLY, NU,
-    SECOND_ORDER, SWAPS, TRACE, WAVES,
+    ALIKE, BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, FAR_BELOW, JOINS, LEAVES, LIKELY,
+    NEARLY, NU, SECOND_ORDER, SWAPS, TRACE, WAVES,
 };
 use crate::effect::{Form, Variable, names};
 use std::collections::BTreeSet;
@@ -83,7 +83,7 @@ impl CauseTable<'_, '_> {
         let Some(newest) = components.last() else {
             return components;
         };
-        self.parts.know(&components, self.frame);
+        self.parts.know(components.iter(), self.frame);
         let coupled = |i: &usize| self.parts.overlap(&components[*i], newest) > *COUPLED;
         let some: Vec<usize> = (0..components.len()).filter(coupled).collect();
         self.backfit_some(components, &some, 1)
@@ -119,14 +119,15 @@ impl CauseTable<'_, '_> {
                 let Some(mut grid) = self.closely(components[i].cell, &state) else {
                     continue;
                 };
-                let found = self.as_found(components[i].cell, &grid);
+                let found = self.shape_found(components[i].cell, &grid);
+                let shape = found.shapes[0].clone();
                 let same = found.forms == components[i].forms
-                    && found.shape.shares.len() == components[i].shape.shares.len();
+                    && shape.shares.len() == components[i].shape.shares.len();
                 if same {
-                    components[i].shape = found.shape.clone();
+                    components[i].shape = shape.clone();
                     components[i].positive = found.positive;
                     components[i].largest = found.largest;
-                    components[i].amplitude = found.amplitude;
+                    components[i].amplitude = grid.amplitude;
                 }
                 if before != (components[i].amplitude, components[i].shape.shares.clone()) {
                     components[i] = self.with_part(components[i].clone());
@@ -135,14 +136,15 @@ impl CauseTable<'_, '_> {
                 if same {
                     continue;
                 }
-                let Some(other) = self.component_evidence(&found, &state) else {
+                let columns = state.columns(self.frame);
+                let Some(other) = self.shape_evidence(found, &state, &columns) else {
                     continue;
                 };
                 // A shape of further numbers stays on the terms on which it came.
-                let paid = |(log, _): (f64, f64), component: &Component| {
-                    log - if component.shape.is_bent { *BENDS } else { 0.0 }
+                let paid = |(log, _): (f64, f64), shape: &CellShape| {
+                    log - if shape.is_bent { *BENDS } else { 0.0 }
                 };
-                if paid(other, &found) > paid(alone, &components[i]) + *SWAPS {
+                if paid(other, &shape) > paid(alone, &components[i].shape) + *SWAPS {
                     grid.refined = self.refined(components[i].cell, &grid, &state);
                     components[i] = self.component(components[i].cell, &grid);
                     changed = true;
@@ -166,7 +168,7 @@ impl CauseTable<'_, '_> {
                 .any(|variable| matches!(variable, Variable::Load { .. } | Variable::ArmLoad))
         };
         let by_load = |best: usize| {
-            let found = self.as_found(best, &scan.closely[&best]);
+            let found = self.shape_found(best, &scan.closely[&best]);
             scan.log_odds[best] > *JOINS && found.forms.iter().any(loads)
         };
         if !scan.best().is_some_and(by_load) {
@@ -213,6 +215,9 @@ impl CauseTable<'_, '_> {
             cells
         };
         let mut seen = BTreeSet::from([key(&components)]);
+        // Cells in whose stead every other was far less probable: after an exchange of what they have nothing in common with they are not asked
+        // again.
+        let mut firm = BTreeSet::new();
         'rounds: for _ in 0..*EXCHANGES {
             let kappa = self.noise(&components);
             let mut order: Vec<usize> = (0..components.len()).collect();
@@ -220,6 +225,9 @@ impl CauseTable<'_, '_> {
             order.sort_by(|a, b| size(a).total_cmp(&size(b)));
             for i in order {
                 let cell = components[i].cell;
+                if firm.contains(&cell) {
+                    continue;
+                }
                 let state = self.state(&without(&components, &[i]), Some(kappa));
                 let alike = self.alike(&components[i], 24);
                 let near: Vec<usize> = std::iter::once(cell)
@@ -231,12 +239,18 @@ impl CauseTable<'_, '_> {
                 let prior = self.log_prior(cell, &state.components);
                 let stays = prior + self.log_evidence(&components[i], &state);
                 if best == cell || scan.log_odds[best] <= stays + *SWAPS {
+                    let others = scan.closely.keys().filter(|other| **other != cell);
+                    let most = others.map(|other| scan.log_odds[*other]);
+                    if most.fold(f64::NEG_INFINITY, f64::max) < stays - *FAR_BELOW {
+                        firm.insert(cell);
+                    }
                     continue;
                 }
                 let mut next = state.components;
                 next.push(self.component(best, &scan.closely[&best]));
                 let next = self.backfit(next, 1);
                 if seen.insert(key(&next)) {
+                    self.loosen(&mut firm, &next, &components[i]);
                     components = next;
                     continue 'rounds;
                 }
@@ -244,6 +258,20 @@ impl CauseTable<'_, '_> {
             break;
         }
         self.prune(components)
+    }
+
+    /// Components that do in part what one does that is gone, or what the newest does, are asked again.
+    fn loosen(&self, firm: &mut BTreeSet<usize>, components: &[Component], gone: &Component) {
+        let Some((newest, others)) = components.split_last() else {
+            return;
+        };
+        self.parts.know(components.iter().chain([gone]), self.frame);
+        for other in others {
+            let coupled = |one: &Component| self.parts.overlap(other, one) > *COUPLED;
+            if coupled(gone) || coupled(newest) {
+                firm.remove(&other.cell);
+            }
+        }
     }
 
     /// Components, or those that a search from the ones with a name finds, whichever are the more probable: what was taken up before another

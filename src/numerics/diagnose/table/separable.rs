@@ -204,7 +204,7 @@ impl CauseTable<'_, '_> {
         block: &CellColumns,
         state: &KnownState,
     ) -> Option<(usize, GroupEvidence, DVector<f64>)> {
-        let columns = self.frame.multiplied(state.columns(self.frame));
+        let columns = state.columns(self.frame);
         let across = self.across_once(block, state, &columns);
         let mut best: Option<(usize, GroupEvidence)> = None;
         for (_, shape, found) in state.shapes(block, &across, 0) {

@@ -8,17 +8,20 @@ use super::evidence::{
     AMPLITUDES, EvidenceRows, GroupEvidence, evidence_at, evidence_between, log_sums,
 };
 use super::factored::unit;
-use super::frame::SearchRows;
+use super::frame::{MultipliedColumns, SearchRows};
 use crate::criteria::cells::{NU, UNEXPLAINED};
 use crate::effect::Form;
-use crate::linear::{Columns, dot};
+use crate::linear::{dot, product};
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
-use faer::{Mat, MatMut, Par, Side};
+use faer::{Mat, MatMut, MatRef, Par, Side};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
+
+/// Columns of which products are taken one by one.
+const FEW: usize = 4;
 
 /// Some components in the covariance.
 pub struct KnownState {
@@ -28,8 +31,6 @@ pub struct KnownState {
     pub rows: EvidenceRows,
     /// Which components.
     pub(super) components: Vec<Component>,
-    /// Their columns of unit prior variance, one component after another, once somebody asks.
-    columns: OnceLock<Columns>,
     /// Keys of their forms, once somebody asks.
     keys: OnceLock<BTreeSet<String>>,
     /// Cholesky factor of kappa^2 + Z'Z.
@@ -72,9 +73,11 @@ impl KnownState {
     ) -> Self {
         let count = along.len();
         let solved = |square: f64| {
-            let matrix = Mat::from_fn(count, count, |i, j| {
-                gram[(i, j)] + if i == j { square } else { 0.0 }
-            });
+            let mut matrix = Mat::zeros(count, count);
+            for (j, column) in gram.as_slice().chunks(count.max(1)).enumerate() {
+                matrix.col_as_slice_mut(j)[j..].copy_from_slice(&column[j..]);
+                matrix[(j, j)] += square;
+            }
             let lower = matrix.llt(Side::Lower).map_or_else(
                 |_| Mat::identity(count, count),
                 |factor| factor.L().to_owned(),
@@ -86,11 +89,23 @@ impl KnownState {
         let mut square = kappa.map_or(1.0, |kappa| kappa * kappa);
         let (mut lower, mut solved_along) = solved(square);
         if kappa.is_none() {
+            // Every step takes a factor of all components: the noise that leaves itself is found by secants.
+            let mut before: Option<[f64; 2]> = None;
             for _ in 0..30 {
                 let left = (rows.square - solved_along.norm_squared()).max(0.0);
                 let next = ((*NU + left) / (*NU + rows.freedom)).max(least_noise);
+                let (at, step) = (square, next - square);
                 let done = (next.sqrt() - square.sqrt()).abs() < 1e-4 * square.sqrt();
-                square = next;
+                let slope = before.map(|[last, gap]| (step - gap) / (at - last));
+                let secant = slope.map_or(next, |slope| at - step / slope);
+                // Less noise explains more: where the slope says otherwise it is rounding.
+                let follows = slope.is_some_and(|slope| slope < 0.0) && secant.is_finite();
+                square = if follows && !done {
+                    secant.max(least_noise)
+                } else {
+                    next
+                };
+                before = Some([at, step]);
                 (lower, solved_along) = solved(square);
                 if done {
                     break;
@@ -106,7 +121,6 @@ impl KnownState {
                 freedom: rows.freedom.min(left),
             },
             components: Vec::new(),
-            columns: OnceLock::new(),
             keys: OnceLock::new(),
             lower,
             along: solved_along,
@@ -127,26 +141,25 @@ impl KnownState {
         self.components.iter().map(coefficients).collect()
     }
 
-    /// Its components' columns of unit prior variance, one component after another, residual rows down.
-    pub(super) fn columns(&self, frame: &SearchRows) -> &Columns {
-        self.columns.get_or_init(|| {
-            let mut columns = DMatrix::zeros(frame.residual().len(), self.along.len());
-            let mut first = 0;
-            for Component { part, .. } in &self.components {
-                columns.view_mut((0, first), part.shape()).copy_from(part);
-                first += part.ncols();
-            }
-            columns.into()
-        })
+    /// Its components' columns of unit prior variance, residual rows down, to be multiplied with others.
+    pub(super) fn columns<'s>(&'s self, frame: &SearchRows) -> MultipliedColumns<'s> {
+        let parts = self.components.iter().map(|component| &*component.part);
+        frame.multiplied(parts.collect())
     }
 
     /// What its components leave of the residual at their likeliest.
     pub(super) fn left(&self, frame: &SearchRows) -> Vec<f64> {
-        let residual = DVector::from_column_slice(frame.residual());
-        let left = match self.weights() {
-            Some(weights) => residual - &**self.columns(frame) * weights,
-            None => residual,
+        let mut left = DVector::from_column_slice(frame.residual());
+        let Some(weights) = self.weights() else {
+            return left.data.into();
         };
+        let mut first = 0;
+        for Component { part, .. } in &self.components {
+            let (rows, count) = part.shape();
+            let mut seen = left.rows_mut(0, rows);
+            seen.gemv(-1.0, part, &weights.rows(first, count), 1.0);
+            first += count;
+        }
         left.data.into()
     }
 
@@ -208,17 +221,23 @@ impl KnownState {
         if self.along.is_empty() {
             return (gram / square, gradient / square);
         }
-        let rows = across.nrows();
-        let column = |j: usize| &across.as_slice()[(first + j) * rows..(first + j + 1) * rows];
-        let mut seen = gram.clone();
-        for j in 0..gradient.len() {
-            for i in 0..=j {
-                seen[(i, j)] = (seen[(i, j)] - dot(column(i), column(j))) / square;
-                seen[(j, i)] = seen[(i, j)];
-            }
-        }
+        let (rows, count) = (across.nrows(), gradient.len());
+        let columns = &across.as_slice()[first * rows..(first + count) * rows];
+        let column = |j: usize| &columns[j * rows..(j + 1) * rows];
         let along = |j: usize, _| (gradient[j] - dot(column(j), self.along.as_slice())) / square;
-        (seen, DVector::from_fn(gradient.len(), along))
+        let along = DVector::from_fn(count, along);
+        if count < FEW {
+            let mut seen = gram.clone();
+            for j in 0..count {
+                for i in 0..=j {
+                    seen[(i, j)] = (seen[(i, j)] - dot(column(i), column(j))) / square;
+                    seen[(j, i)] = seen[(i, j)];
+                }
+            }
+            return (seen, along);
+        }
+        let columns = MatRef::from_column_major_slice(columns, rows, count);
+        ((gram - product(columns, columns)) / square, along)
     }
 
     /// The likeliest coefficients (SI) of a block of one group in a shape at an amplitude given the components.
@@ -303,6 +322,29 @@ impl KnownState {
         most
     }
 
+    /// ln of the evidence of a component in its shape with the weight of that, and its amplitude, from products of parts alone; nothing where
+    /// its one coefficient would have a size that it cannot have.
+    pub(super) fn component_evidence(
+        &self,
+        component: &Component,
+        products: &PartProducts,
+    ) -> Option<(f64, f64)> {
+        let (gram, gradient, across) = products.beside(component, &self.components)?;
+        let (gram, gradient) = self.see((&gram, &gradient), &self.solved(across), 0);
+        if let [square] = component.square[..] {
+            let root = component.roots().sum::<f64>();
+            let per_part = gradient[0] / gram[(0, 0)].max(f64::MIN_POSITIVE);
+            let coefficient = per_part * root / square.sqrt();
+            if is_impossible(coefficient, component.positive, component.largest) {
+                return None;
+            }
+        }
+        // Its part has the prior variance of its amplitude.
+        let shares = vec![component.amplitude.powi(-2); gradient.len()];
+        let found = evidence_between(&gram, &gradient, &shares, self.rows, [0.0, f64::INFINITY]);
+        Some((found.log + component.shape.log_weight, found.amplitude))
+    }
+
     /// What each shape of a block says, by its group and its place in that: its evidence with its weight; nothing of a shape whose coefficient
     /// would have a size that it cannot have.
     pub(super) fn shapes(
@@ -355,14 +397,18 @@ impl KnownState {
                 let coefficient = gradient[0]
                     / gram[(0, 0)].max(f64::MIN_POSITIVE)
                     / block.square[group.range.start].sqrt();
-                let wrong = group.group.positive && coefficient < 0.0;
-                if wrong || coefficient.abs() > 1.5 * group.group.largest {
+                if is_impossible(coefficient, group.group.positive, group.group.largest) {
                     return None;
                 }
             }
             Some((g, (gram, gradient)))
         })
     }
+}
+
+/// Whether a coefficient (SI) has a sign or a size that it cannot have.
+fn is_impossible(coefficient: f64, positive: bool, largest: f64) -> bool {
+    positive && coefficient < 0.0 || coefficient.abs() > 1.5 * largest
 }
 
 /// L^-1 times columns, one after another.

@@ -100,7 +100,7 @@ impl CauseTable<'_, '_> {
             let forms = [line.clone(), curve.clone()].into_iter().chain(after);
             let group = ShapeGroup::new(forms.collect(), Vec::new());
             let block = CellColumns::of(vec![group], self.frame);
-            let columns = self.frame.multiplied(state.columns(self.frame));
+            let columns = state.columns(self.frame);
             let across = self.across_once(&block, state, &columns);
             let (gram, gradient) = state.seen(&block.groups[0], &across, 0);
             let steps = Steps {

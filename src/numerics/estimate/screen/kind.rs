@@ -7,7 +7,7 @@ use crate::criteria::screen::{
     ALIKE, BETTER, CANDIDATES, DISAGREES, IMPOSSIBLE, JOINTS, LONG_RUN, RUN, SLIP_TOLERANCE, SOLE,
     ZERO,
 };
-use crate::estimate::factor::axpy;
+use crate::estimate::factor::{axpy, dot};
 use crate::estimate::model::Model;
 use crate::estimate::problem::{HUBER, ObservationTerm, Problem, columns};
 use crate::observation::{KINDS, MeasurementKind, noise};
@@ -362,16 +362,14 @@ pub(super) fn leave_one_out(problem: &Problem, model: &Model, free: &[usize]) ->
                 distance: 0.0,
             });
         }
-        // H = G G', G = J R^-1 of the whitened derivatives.
-        let seen = inverse
-            .as_ref()
-            .map_or_else(|| Mat::zeros(lines.nrows(), 1), |inverse| &lines * inverse);
+        // H = G G', G = J R^-1 of the whitened derivatives; a line of G a column.
+        let seen = match &inverse {
+            Some(inverse) => inverse.transpose() * lines.transpose(),
+            None => Mat::zeros(1, lines.nrows()),
+        };
         for (k, (i, fitted, error)) in terms.into_iter().enumerate() {
-            let leverage = Matrix3::from_fn(|a, b| {
-                (0..seen.ncols())
-                    .map(|j| seen[(3 * k + a, j)] * seen[(3 * k + b, j)])
-                    .sum()
-            });
+            let line = |axis: usize| seen.col_as_slice(3 * k + axis);
+            let leverage = Matrix3::from_fn(|a, b| dot(line(a), line(b)));
             let weight = match error.norm() {
                 _ if !fitted => 0.0,
                 length if length > HUBER => HUBER / length,
