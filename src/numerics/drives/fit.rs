@@ -304,16 +304,12 @@ impl Drives {
             fit.doubt = self.doubt(&fit);
         }
         let first = if anew { Anew::All } else { Anew::Unknown };
-        // Of a trial the responses to what is linear hold from the beginning, all others from the second look on.
-        let is_linear = |one: &Accepted<Key>| {
-            let shape = &one.cell.shapes[one.shape];
-            let free = shape.usual.iter().filter(|usual| **usual > 0.0).count();
-            !one.cell.key.has_memory() && Sizes::of(one).numbers.len() == free
-        };
-        let hold = anew
-            || set
-                .iter()
-                .all(|one| fit.known(one.cell.key, 0).is_some() || is_linear(one));
+        // Of a trial the responses to torques in proportion to their numbers hold from the beginning, all others from the third look on.
+        let is_proportional = set.iter().all(|one| {
+            let key = one.cell.key;
+            fit.known(key, 0).is_some() || key.is_proportional()
+        });
+        let hold = anew || is_proportional;
         let is_rolled = dear || stands;
         let (mut columns, mut normal) = self.looked(&mut fit, first, (hold, is_rolled));
         if before.is_none() {
@@ -346,7 +342,10 @@ impl Drives {
                 true => Anew::Causes,
                 false => Anew::Unknown,
             };
-            let hold = !anew || again == Anew::All;
+            let hold = match anew {
+                true => again == Anew::All,
+                false => is_proportional || step > 1,
+            };
             let (mut by, mut moved) = (1.0, None);
             while by > patience.least {
                 let mut trial = fit.clone();
