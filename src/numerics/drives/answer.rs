@@ -6,6 +6,7 @@ use crate::key::Key;
 use crate::physics::Physics;
 use crate::problem::Drives;
 use crate::rollout::Which;
+use crate::steps::HALVED;
 use calib_engine::{Accepted, Cell, Finding, Options};
 
 /// A number of a finding.
@@ -95,9 +96,6 @@ pub struct DriveDiagnosis {
     pub rows: usize,
 }
 
-/// Times that steps are halved at most, and times what they err by that a finding explains at least.
-const HALVED: usize = 2;
-const DOUBT: f64 = 3.0;
 /// Times the noise from which on something remains.
 const REMAINS: f64 = 1.1;
 
@@ -111,25 +109,31 @@ pub fn diagnose(
     let is_part = part.is_some();
     let mut searched = part.unwrap_or_else(|| problem.clone());
     let mut whole = problem.clone();
-    let mut answer = calib_engine::diagnose(&searched, &[], options, &mut tell);
-    // Steps that serve the simulation as it is may be too long for what was found: a finding that explains no more than they err by may be
-    // their error. Then they are halved, and what finer ones may still err by is noise.
-    for _ in 0..HALVED {
-        let found = searched.physics(&answer.after.inertia, &answer.after.set);
-        let (moves, square) = searched.coarseness(&found);
-        let explained = 0.5 * answer.after.share() * square;
-        if answer
-            .findings
-            .iter()
-            .all(|one| one.log_odds > DOUBT * explained)
-        {
-            break;
+    let mut start = Vec::new();
+    let answer = loop {
+        let answer = calib_engine::diagnose(&searched, &start, options, &mut tell);
+        if searched.halved == HALVED {
+            break answer;
         }
-        let off: Vec<f64> = moves.iter().map(|way| 0.5 * way).collect();
-        (searched, whole) = (searched.finer(&off), whole.finer(&off));
-        tell(format!("steps of {:.2} ms", 1e3 * searched.chain.step));
-        answer = calib_engine::diagnose(&searched, &answer.after.set, options, &mut tell);
-    }
+        // Steps that serve the simulation as it is may be too long for what was found: a finding that explains no more than they err by may
+        // be their error. Then they are halved, and what finer ones may still err by is noise.
+        let found = searched.physics(&answer.after.inertia, &answer.after.set);
+        let coarse = searched.coarseness(&found);
+        let odds = answer.findings.iter().map(|one| one.log_odds);
+        if answer.is_served && searched.exceed(odds, &answer.after, coarse.square) {
+            break answer;
+        }
+        let finer = searched.finer(&found, &coarse);
+        whole = whole.stepped_as(&finer, &coarse);
+        searched = finer;
+        let chain = &searched.chain;
+        tell(format!(
+            "steps of {:.2} ms, {:.2} ms where a gear yields",
+            1e3 * chain.step,
+            1e3 * chain.geared_step
+        ));
+        start = answer.after.set;
+    };
     // What stands is fitted to all rows.
     let problem = &whole;
     let after = match is_part {

@@ -75,8 +75,11 @@ impl Drives {
         let n = self.chain.joints();
         let rows_a_joint = self.fitted().count() as f64;
         let squares = self.squares(fit);
-        let level = rows_a_joint * (1.0 + ABOVE_NOISE * (2.0 / rows_a_joint).sqrt());
-        let above = |joint: usize| squares[joint] > level;
+        let level = |count: f64| count * (1.0 + ABOVE_NOISE * (2.0 / count).sqrt());
+        let (slow, sums) = self.slow_squares(fit);
+        let above = |joint: usize| {
+            squares[joint] > level(rows_a_joint) || (sums > 0.0 && slow[joint] > level(sums))
+        };
         let any = (0..n).any(above);
         // A gain that is far off shows in the residual: as much as the drive's own error.
         let residual = self.errors_of(&fit.angles);
@@ -190,7 +193,7 @@ impl Around {
         let mut b = vec![0.0; nb + effects.len()];
         let mut rich = Rich::new(drives, nb + columns.len());
         roll(
-            &drives.chain,
+            &drives.scanned,
             &now,
             &drives.recording,
             &carried,
@@ -199,7 +202,7 @@ impl Around {
                 for joint in 0..n {
                     let at = row.row * n + joint;
                     let sigma = drives.sigma[at] * fit.doubt[joint];
-                    let residual = (drives.recording.angle[at] - row.angle[joint]) / sigma;
+                    let residual = (drives.recording.angle[at] - fit.angles[at]) / sigma;
                     base.at(at, row.change[joint], sigma, &mut b[..nb]);
                     for (to, effect) in b[nb..].iter_mut().zip(&effects) {
                         *to = effect[at] / sigma;

@@ -229,7 +229,7 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
         add(
             Key::DeadBand(j),
             &DEAD_BAND,
-            [0.1, 0.3, 1.0]
+            [0.1, 0.2, 0.4, 0.8, 1.6]
                 .map(|w| at(&[(w * u.error.max(1e-5)).ln()], &[1.0]))
                 .to_vec(),
         );
@@ -306,7 +306,8 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
         // Of what there is: a share of nothing has no size.
         let shares = [p.friction, p.damping].map(|friction| if friction > 0.0 { 0.7 } else { 0.0 });
         if shares != [0.0; 2] && shown > SOONEST_WARM {
-            // What takes longer than the recording is friction that stays.
+            // What takes many times longer than the recording is friction that stays.
+            let longest = SLOWEST_WARM * shown;
             let mut times: Vec<f64> = WARM.into_iter().filter(|time| *time < shown).collect();
             times.push(shown);
             let warm_up = times.into_iter().map(|time| {
@@ -322,7 +323,11 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
                     start: start.clone(),
                     usual: vec![shares[0], shares[1], 0.7],
                     // What is cold is stiffer: oil thins as it warms.
-                    bounds: vec![FREE, [0.0, f64::INFINITY], [SOONEST_WARM.ln(), shown.ln()]],
+                    bounds: vec![
+                        FREE,
+                        [0.0, f64::INFINITY],
+                        [SOONEST_WARM.ln(), longest.ln()],
+                    ],
                     log_weight: 0.0,
                 }
             });
@@ -413,6 +418,8 @@ const FREE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 /// (Bittencourt and Gunnarsson, 2012; Simoni et al., 2015); 10 s is a servo of a few grams of grease, and sooner is no warmth.
 const WARM: [f64; 3] = [15.0, 60.0, 300.0];
 const SOONEST_WARM: f64 = 10.0;
+/// Times that the recording lasts in which friction goes at most: it falls by a fifth then, which is no friction that stays.
+const SLOWEST_WARM: f64 = 4.0;
 
 /// Factors of a gain that is stated in other units or is another servo's: so far that no derivative tells it. Share of all gains that are so.
 pub(crate) const FAR: [f64; 4] = [1.0 / 64.0, 1.0 / 16.0, 0.25, 4.0];

@@ -76,10 +76,12 @@ impl Chain {
         self.axes.len()
     }
 
-    /// Steps of half the length.
-    pub(crate) fn halve(&mut self) {
-        self.step *= 0.5;
+    /// Steps of half the length, of all roll-outs or of those where a gear yields.
+    pub(crate) fn halve(&mut self, geared: bool) {
         self.geared_step *= 0.5;
+        if !geared {
+            self.step *= 0.5;
+        }
     }
 
     /// The tool point at the reference pose.

@@ -1,7 +1,7 @@
 //! How simulated angles change with the physics: a change is torques at the same motion, which the linearised steps carry on.
 //!
 //! Between two rows the steps are one product of matrices, so that a change costs a few products a row and one torque a step, at the joint
-//! where it acts.
+//! where it acts; a few changes are carried step by step, which needs no matrices.
 
 use crate::chain::{Bodies, Chain, MOST, Moved, Posed, Row, Square};
 use crate::physics::{Commanded, Curve, Joint, Motion, Physics, Torque, slewed};
@@ -76,6 +76,17 @@ pub(crate) struct StepMatrices {
     pub(crate) h: f64,
 }
 
+/// A linearised step as it is made: the inverse of the implicit mass, what pulls back by angles and by speeds, and which degrees of freedom
+/// friction holds, with the inverse of the first over these.
+pub(crate) struct StepParts<'a> {
+    pub(crate) w: &'a Square,
+    pub(crate) stiff: &'a Square,
+    pub(crate) damp: &'a Square,
+    pub(crate) held: &'a [usize],
+    pub(crate) inner: &'a Square,
+    pub(crate) h: f64,
+}
+
 /// What is known of a step before it is made.
 pub(crate) struct Instant<'a> {
     pub(crate) physics: &'a Physics,
@@ -114,6 +125,8 @@ pub(crate) struct Columns<'a> {
     weights: Vec<f64>,
     steps: Vec<StepMatrices>,
     gains: Vec<[Tall; MOST]>,
+    /// By direction, what it asks for in a step that is carried by itself.
+    forces: Vec<Row>,
     since: usize,
     /// By joint, the change of each direction as its encoder sees it.
     seen: Vec<f64>,
@@ -178,6 +191,7 @@ impl<'a> Columns<'a> {
             weights: Vec::new(),
             steps: Vec::new(),
             gains: Vec::new(),
+            forces: vec![[0.0; MOST]; directions.len()],
             since: 0,
             seen: vec![0.0; n * directions.len()],
         }
@@ -190,6 +204,56 @@ impl<'a> Columns<'a> {
 
     pub(crate) fn is_empty(&self) -> bool {
         self.count == 0
+    }
+
+    /// Whether they are so few that steps are not multiplied.
+    pub(crate) fn is_few(&self) -> bool {
+        self.count <= 2 * self.freedoms
+    }
+
+    /// All changes by one step.
+    pub(crate) fn carry_step(&mut self, rotor: &[usize], step: &StepParts) {
+        let (m, n, h) = (self.freedoms, rotor.len(), step.h);
+        self.forces.fill([0.0; MOST]);
+        let forces = &mut self.forces;
+        for (slot, push) in self.slots.iter().zip(self.pushes.chunks_exact(2)) {
+            let force = &mut forces[slot.direction];
+            force[rotor[slot.joint]] += push[0];
+            force[slot.joint] += push[1];
+        }
+        for (heavier, weights) in self.heavier.iter().zip(self.weights.chunks_exact(n)) {
+            add(&mut forces[heavier.direction], 1.0, weights);
+        }
+        for (state, force) in self.state.chunks_exact_mut(2 * m).zip(forces) {
+            let (angle, speed) = state.split_at_mut(m);
+            let mut ahead = [0.0; MOST];
+            for i in 0..m {
+                ahead[i] = angle[i] + 0.5 * h * speed[i];
+            }
+            for i in 0..m {
+                let pulled: f64 = (0..m)
+                    .map(|k| step.stiff[i][k] * ahead[k] + step.damp[i][k] * speed[k])
+                    .sum();
+                force[i] = h * (force[i] - pulled);
+            }
+            let mut new = [0.0; MOST];
+            new[..m].copy_from_slice(speed);
+            for (column, force) in step.w.iter().zip(&force[..m]) {
+                // The inverse is symmetric.
+                add(&mut new[..m], *force, &column[..m]);
+            }
+            let stopped: Row = std::array::from_fn(|k| step.held.get(k).map_or(0.0, |i| new[*i]));
+            for (row, i) in step.inner.iter().zip(step.held) {
+                let by: f64 = row.iter().zip(&stopped).map(|(a, b)| a * b).sum();
+                add(&mut new[..m], -by, &step.w[*i][..m]);
+            }
+            for i in 0..m {
+                angle[i] += 0.5 * h * (speed[i] + new[i]);
+                speed[i] = new[i];
+            }
+        }
+        self.pushes.clear();
+        self.weights.clear();
     }
 
     /// At the beginning of a recording.
@@ -456,5 +520,56 @@ fn slot_torque(
     push[0] = t.smooth - before.smooth - dry - rotor * acceleration[r];
     if r != joint {
         push[1] = t.link - before.link;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::against_mujoco::motion;
+    use crate::physics::Gear;
+    use crate::rollout::{Which, roll};
+
+    #[test]
+    fn changes_carried_step_by_step_are_those_of_the_product_of_steps() {
+        let (chain, mut physics, recording) = motion();
+        physics.joints[1].friction = 0.2;
+        physics.joints[2].gear = Some(Gear {
+            stiffness: 400.0,
+            damping: 0.5,
+            play: 0.0,
+            encoder_on_link: false,
+        });
+        let mut damped = physics.clone();
+        damped.joints[2].damping += 0.1;
+        let mut heavier = physics.clone();
+        heavier.bodies.links[3].mass *= 1.1;
+        let few = [&damped, &heavier].map(|changed| Direction::between(&physics, changed));
+        let many = few.iter().cycle().take(12).cloned();
+        let many: Vec<Direction> = many.collect();
+        let changes = |directions: &[Direction]| {
+            let mut all: Vec<[f64; 2]> = Vec::new();
+            roll(
+                &chain,
+                &physics,
+                &recording,
+                directions,
+                Which::All,
+                |row| {
+                    all.extend((0..4).map(|joint| [row.change[joint][0], row.change[joint][1]]));
+                },
+            );
+            all
+        };
+        let (few, many) = (changes(&few), changes(&many));
+        for direction in 0..2 {
+            let size = many
+                .iter()
+                .fold(0.0_f64, |most, change| most.max(change[direction].abs()));
+            assert!(size > 1e-6, "{size}");
+            for (a, b) in few.iter().zip(&many) {
+                assert!((a[direction] - b[direction]).abs() < 1e-8 * size);
+            }
+        }
     }
 }

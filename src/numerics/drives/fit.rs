@@ -10,14 +10,13 @@ use calib_engine::Accepted;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// The statement of the noise counts as so many rows.
-const NU: f64 = 20.0;
-
 /// Steps of Gauss and Newton at most, and the fall of the objective, and the share of it, below which no further one is made.
 struct Patience {
     steps: usize,
     fall: f64,
     share: f64,
+    /// Share of a step below which none is tried.
+    least: f64,
 }
 
 /// Of a trial among many, and of what stands.
@@ -25,11 +24,13 @@ const TRIAL: Patience = Patience {
     steps: 6,
     fall: 0.5,
     share: 5e-4,
+    least: 0.1,
 };
 const STANDS: Patience = Patience {
     steps: 10,
     fall: 0.05,
     share: 1e-5,
+    least: 0.02,
 };
 
 /// Times what a linear step promises that a fit may still gain.
@@ -66,10 +67,10 @@ pub struct DriveFit {
     /// ln of the prior odds of the set.
     pub log_prior: f64,
     /// Products of the columns in units of their priors.
-    gram: DMatrix<f64>,
+    pub(crate) gram: DMatrix<f64>,
     /// Cause and number of each column beyond the inertials.
-    numbers: Vec<(usize, usize)>,
-    /// Responses as they were when all of them were made anew: they hardly change with a further cause.
+    pub(crate) numbers: Vec<(usize, usize)>,
+    /// Responses as they were when all of them were made anew, which hardly change with a further cause, and those to that cause.
     responses: Arc<Responses>,
 }
 
@@ -129,94 +130,12 @@ impl BaseColumns {
     }
 }
 
-/// ln of the likelihood of a squared residual: with the scale of the noise integrated where it is above its statement.
-fn log_likelihood(square: f64, rows: f64, independence: f64) -> f64 {
-    let n = rows * independence;
-    if square < rows {
-        -0.5 * independence * (square - rows)
-    } else {
-        -0.5 * (n + NU) * ((NU + square * independence) / (NU + n)).ln()
-    }
-}
-
 impl DriveFit {
-    /// Share of independent rows: the larger of the estimates from this model's residual and from that of a rich one.
-    pub fn share(&self) -> f64 {
-        self.independence.max(self.rich)
-    }
-
     /// Number of the known response to a number of a cause.
     fn known(&self, key: Key, number: usize) -> Option<usize> {
         let numbers = &self.responses.numbers;
         let at = numbers.iter().position(|one| *one == (key, number))?;
         Some(self.inertia.len() + at)
-    }
-
-    /// Inverse of the posterior's variance, in units of the priors.
-    fn precision(&self, independence: f64) -> DMatrix<f64> {
-        let scale = (self.square / self.freedom).max(1.0);
-        let count = self.gram.nrows();
-        &self.gram * (independence / scale) + DMatrix::identity(count, count)
-    }
-
-    /// ln of the odds of a member against nothing: its prior over its posterior where it is nothing (Dickey, 1971); `None` where no number
-    /// of it is 0 then.
-    pub fn odds(&self, member: usize, independence: f64) -> Option<f64> {
-        let one = &self.set[member];
-        let shape = &one.cell.shapes[one.shape];
-        let sizes = Sizes::of(one);
-        let columns: Option<Vec<usize>> = sizes
-            .numbers
-            .iter()
-            .map(|k| {
-                self.numbers
-                    .iter()
-                    .position(|number| *number == (member, *k))
-            })
-            .collect();
-        let columns = columns.filter(|columns| !columns.is_empty())?;
-        let inverse = self.precision(independence).cholesky()?.inverse();
-        let nb = self.inertia.len();
-        let count = columns.len();
-        let variance = DMatrix::from_fn(count, count, |i, k| {
-            inverse[(nb + columns[i], nb + columns[k])]
-        });
-        let width = sizes.precision().sqrt();
-        let size = DVector::from_fn(count, |i, _| {
-            let k = sizes.numbers[i];
-            one.numbers[k] * width / shape.usual[k]
-        });
-        let factor = variance.cholesky()?;
-        let half_log_det: f64 = factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum();
-        Some(
-            0.5 * size.dot(&factor.solve(&size))
-                + half_log_det
-                + sizes.log_tail()
-                + one.cell.log_prior
-                + shape.log_weight,
-        )
-    }
-
-    /// What evidence may be reached at most where the squared residual still falls by so much.
-    fn reach(&self, falls: f64, independence: f64) -> f64 {
-        log_likelihood((self.square - falls).max(0.0), self.freedom, independence) + self.log_prior
-    }
-
-    /// ln of the evidence, where so large a share of the rows is independent.
-    pub fn log_evidence(&self, independence: f64) -> f64 {
-        let whole = self.precision(independence);
-        let log_det = whole.cholesky().map_or(f64::INFINITY, |factor| {
-            2.0 * factor
-                .l_dirty()
-                .diagonal()
-                .iter()
-                .map(|d| d.ln())
-                .sum::<f64>()
-        });
-        let tails: f64 = self.set.iter().map(|one| Sizes::of(one).log_tail()).sum();
-        log_likelihood(self.square, self.freedom, independence) - 0.5 * self.penalty - 0.5 * log_det
-            + tails
-            + self.log_prior
     }
 }
 
@@ -385,7 +304,14 @@ impl Drives {
             fit.doubt = self.doubt(&fit);
         }
         let first = if anew { Anew::All } else { Anew::Unknown };
-        let (mut columns, mut normal) = self.looked(&mut fit, first);
+        // Of a trial the responses to torques in proportion to their numbers hold from the beginning, all others from the third look on.
+        let is_proportional = set.iter().all(|one| {
+            let key = one.cell.key;
+            fit.known(key, 0).is_some() || key.is_proportional()
+        });
+        let hold = anew || is_proportional;
+        let is_rolled = dear || stands;
+        let (mut columns, mut normal) = self.looked(&mut fit, first, (hold, is_rolled));
         if before.is_none() {
             fit.independence = self.independence_of(&fit);
         }
@@ -416,8 +342,12 @@ impl Drives {
                 true => Anew::Causes,
                 false => Anew::Unknown,
             };
+            let hold = match anew {
+                true => again == Anew::All,
+                false => is_proportional || step > 1,
+            };
             let (mut by, mut moved) = (1.0, None);
-            while by > 0.02 {
+            while by > patience.least {
                 let mut trial = fit.clone();
                 let nb = trial.inertia.len();
                 for (k, number) in trial.inertia.iter_mut().enumerate() {
@@ -439,7 +369,7 @@ impl Drives {
                     self.evaluate(&mut trial);
                     None
                 } else {
-                    Some(self.looked(&mut trial, again))
+                    Some(self.looked(&mut trial, again, (hold, false)))
                 };
                 let now = weight * trial.square + self.penalty(&trial);
                 if now < objective {
@@ -452,7 +382,7 @@ impl Drives {
                 break;
             };
             fit = next;
-            (columns, normal) = seen.unwrap_or_else(|| self.looked(&mut fit, again));
+            (columns, normal) = seen.unwrap_or_else(|| self.looked(&mut fit, again, (hold, true)));
             is_new = again == Anew::All;
             // What is doubted is fitted as well as what is not.
             let doubt = fit
@@ -464,7 +394,7 @@ impl Drives {
             }
         }
         if anew && !is_new {
-            (columns, normal) = self.looked(&mut fit, Anew::All);
+            (columns, normal) = self.looked(&mut fit, Anew::All, (true, true));
         }
         fit.independence = self.independence_of(&fit);
         fit.penalty = self.penalty(&fit);
@@ -490,43 +420,67 @@ impl Drives {
         fit
     }
 
-    /// Columns around a fit and their products.
-    fn looked(&self, fit: &mut DriveFit, anew: Anew) -> (BaseColumns, Normal) {
+    /// Columns around a fit and their products; whether responses are held from here on, and whether the fit is rolled out, so that it has its
+    /// angles.
+    fn looked(
+        &self,
+        fit: &mut DriveFit,
+        anew: Anew,
+        (hold, is_rolled): (bool, bool),
+    ) -> (BaseColumns, Normal) {
         let columns = self.base_columns(fit, anew);
-        let normal = self.normal(fit, &columns, anew == Anew::All);
+        let is_new = |source: &Source| !matches!(source, Source::Known(..));
+        let kept = hold && columns.sources.iter().any(is_new);
+        let normal = self.normal(fit, &columns, kept, is_rolled);
         (columns, normal)
     }
 
-    /// Products of the columns around a fit; the fit's angles are those of the same roll-out, and responses are `kept` where all were made
-    /// anew.
-    fn normal(&self, fit: &mut DriveFit, columns: &BaseColumns, kept: bool) -> Normal {
+    /// Products of the columns around a fit, whose responses may be `kept`; the fit's angles are those of the same roll-out, where none was made
+    /// yet or a column needs one.
+    fn normal(
+        &self,
+        fit: &mut DriveFit,
+        columns: &BaseColumns,
+        kept: bool,
+        is_rolled: bool,
+    ) -> Normal {
         let n = self.chain.joints();
         let physics = self.physics(&fit.inertia, &fit.set);
         let count = columns.count();
         let mut normal = Normal::new(count);
         let mut x = vec![0.0; count];
         let mut changes = vec![vec![0.0; fit.angles.len()]; if kept { count } else { 0 }];
-        let (angles, doubt) = (&mut fit.angles, &fit.doubt);
-        roll(
-            &self.chain,
-            &physics,
-            &self.recording,
-            &columns.directions,
-            Which::Fitted,
-            |row| {
-                for joint in 0..n {
-                    let at = row.row * n + joint;
-                    let sigma = self.sigma[at] * doubt[joint];
-                    angles[at] = row.angle[joint];
-                    columns.at(at, row.change[joint], sigma, &mut x);
-                    changes
-                        .iter_mut()
-                        .zip(&x)
-                        .for_each(|(change, x)| change[at] = x * sigma);
-                    normal.add(&x, (self.recording.angle[at] - row.angle[joint]) / sigma);
-                }
-            },
-        );
+        let doubt = &fit.doubt;
+        let mut add = |row: usize, joint: usize, angle: f64, change: &[f64]| {
+            let at = row * n + joint;
+            let sigma = self.sigma[at] * doubt[joint];
+            columns.at(at, change, sigma, &mut x);
+            changes
+                .iter_mut()
+                .zip(&x)
+                .for_each(|(change, x)| change[at] = x * sigma);
+            normal.add(&x, (self.recording.angle[at] - angle) / sigma);
+        };
+        if is_rolled && columns.directions.is_empty() {
+            for row in self.fitted() {
+                (0..n).for_each(|joint| add(row, joint, fit.angles[row * n + joint], &[]));
+            }
+        } else {
+            let angles = &mut fit.angles;
+            roll(
+                &self.chain,
+                &physics,
+                &self.recording,
+                &columns.directions,
+                Which::Fitted,
+                |row| {
+                    for joint in 0..n {
+                        angles[row.row * n + joint] = row.angle[joint];
+                        add(row.row, joint, row.angle[joint], row.change[joint]);
+                    }
+                },
+            );
+        }
         if kept {
             let key = |(c, k): &(usize, usize)| (fit.set[*c].cell.key, *k);
             fit.responses = Arc::new(Responses {

@@ -75,6 +75,18 @@ impl Key {
         }
     }
 
+    /// Whether it is a torque in proportion to its numbers, so that a response to them holds for all sizes.
+    pub fn is_proportional(self) -> bool {
+        matches!(
+            self,
+            Self::Offset(_)
+                | Self::Viscous(_)
+                | Self::Coulomb(_)
+                | Self::Coupling(..)
+                | Self::Unknown(..)
+        )
+    }
+
     /// Whether what it changes has a memory, so that its numbers are fitted by roll-outs of their own.
     pub fn has_memory(self) -> bool {
         matches!(

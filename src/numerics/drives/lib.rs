@@ -16,6 +16,7 @@ mod around;
 mod causes;
 pub mod chain;
 mod columns;
+mod evidence;
 pub mod excite;
 mod fit;
 mod independence;
@@ -27,6 +28,8 @@ mod problem;
 pub mod recording;
 pub mod rollout;
 mod sizes;
+mod starts;
+mod steps;
 
 pub use answer::{DriveDiagnosis, DriveFinding, DriveNumber, DriveRival, JointError, diagnose};
 pub use around::Around;

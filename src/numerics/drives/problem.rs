@@ -2,12 +2,13 @@
 
 use crate::around::Around;
 use crate::causes::Usual;
-use crate::chain::{Chain, STEP};
+use crate::chain::Chain;
 use crate::fit::DriveFit;
 use crate::key::Key;
 use crate::physics::Physics;
 use crate::recording::{Recording, Trajectory};
 use crate::rollout::{Which, roll};
+use crate::steps::longest;
 use calib_dynamics::InertialTolerance;
 use calib_engine::{Accepted, Problem, Scanned};
 
@@ -16,10 +17,8 @@ pub(crate) const FREE: usize = 5;
 /// s of recordings in which causes are looked for, and of a window of longer ones.
 const SEARCHED: f64 = 40.0;
 const WINDOW: f64 = 8.0;
-
-/// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion.
-const LONGER: [f64; 2] = [2.5e-3, 1.7e-3];
-const SAME: f64 = 0.03;
+/// Rows of which a residual is summed.
+const SLOW: usize = 5;
 
 /// A simulated arm and its recording.
 #[derive(Debug, Clone)]
@@ -39,6 +38,10 @@ pub struct Drives {
     /// s from the beginning of a recording to its last row, and to the last that is fitted.
     pub(crate) duration: f64,
     pub(crate) shown: f64,
+    /// The chain with the steps of a scan: it ranks, so that it needs no finer ones.
+    pub(crate) scanned: Chain,
+    /// Times that steps were halved.
+    pub(crate) halved: usize,
 }
 
 impl Drives {
@@ -50,7 +53,7 @@ impl Drives {
         tolerance: InertialTolerance,
     ) -> Self {
         let sigma = recording.sigma();
-        chain.step = step(&chain, &base, &recording, &sigma);
+        chain.step = longest(&chain, &base, &recording, &sigma);
         let lasts = |t: &Trajectory| recording.time[t.rows.end - 1] - t.began;
         let duration = recording.trajectories.iter().map(lasts).fold(0.0, f64::max);
         let fitted = recording.trajectories.iter().filter_map(|t| {
@@ -60,6 +63,8 @@ impl Drives {
         let shown = fitted.fold(0.0, f64::max);
         let usual = usual(&chain, &base, &recording);
         Self {
+            scanned: chain.clone(),
+            halved: 0,
             chain,
             base,
             recording,
@@ -109,41 +114,6 @@ impl Drives {
             recording: self.recording.cut(&kept),
             ..self.clone()
         })
-    }
-
-    /// By joint, rad rms by which a simulation moves where its steps are halved, and the whitened square of that in all rows.
-    pub(crate) fn coarseness(&self, physics: &Physics) -> (Vec<f64>, f64) {
-        let n = self.chain.joints();
-        let mut fine = self.clone();
-        fine.chain.halve();
-        let (now, finer) = (
-            self.angles(physics, Which::Fitted),
-            fine.angles(physics, Which::Fitted),
-        );
-        let mut squares = vec![0.0; n];
-        let (mut rows, mut whitened) = (0.0, 0.0);
-        for row in self.fitted() {
-            rows += 1.0;
-            for (joint, square) in squares.iter_mut().enumerate() {
-                let at = row * n + joint;
-                let moves = (now[at] - finer[at]).powi(2);
-                *square += moves;
-                whitened += moves / self.sigma[at].powi(2);
-            }
-        }
-        let root = |square: f64| (square / rows).sqrt();
-        (squares.into_iter().map(root).collect(), whitened)
-    }
-
-    /// The same by steps of half the length; what these may still be off, rad by joint, is noise.
-    pub(crate) fn finer(&self, off: &[f64]) -> Self {
-        let n = self.chain.joints();
-        let mut finer = self.clone();
-        finer.chain.halve();
-        for (at, sigma) in finer.sigma.iter_mut().enumerate() {
-            *sigma = sigma.hypot(off[at % n]);
-        }
-        finer
     }
 
     /// The simulation with inertials within their tolerance and a set of causes.
@@ -204,6 +174,30 @@ impl Drives {
         squares
     }
 
+    /// Squared residual of a fit as that of noise, joint by joint, of the sums of a few rows each, and how many sums there are: what lasts from
+    /// row to row stands out of noise there.
+    pub(crate) fn slow_squares(&self, fit: &DriveFit) -> (Vec<f64>, f64) {
+        let n = self.chain.joints();
+        let (mut squares, mut count) = (vec![0.0; n], 0.0);
+        for trajectory in &self.recording.trajectories {
+            let rows: Vec<usize> = trajectory.rows.clone().collect();
+            for rows in rows.chunks_exact(SLOW) {
+                if rows.iter().any(|row| self.recording.held_out[*row]) {
+                    continue;
+                }
+                count += 1.0;
+                for (joint, square) in squares.iter_mut().enumerate() {
+                    let whitened = rows.iter().map(|row| row * n + joint).map(|at| {
+                        (self.recording.angle[at] - fit.angles[at])
+                            / (self.sigma[at] * fit.doubt[joint])
+                    });
+                    *square += whitened.sum::<f64>().powi(2) / SLOW as f64;
+                }
+            }
+        }
+        (squares, count)
+    }
+
     /// rad rms of the residual of each joint in fitted rows.
     pub(crate) fn errors_of(&self, angles: &[f64]) -> Vec<f64> {
         let n = self.chain.joints();
@@ -221,33 +215,6 @@ impl Drives {
             .map(|square| (square / rows).sqrt())
             .collect()
     }
-}
-
-/// The longest step, s, at which the simulation as it is goes where finer steps go, to a small share of the noise: in all rows, as those that
-/// judge may ask more of a drive.
-fn step(chain: &Chain, base: &Physics, recording: &Recording, sigma: &[f64]) -> f64 {
-    let n = chain.joints();
-    let rolled = |step: f64| {
-        let mut chain = chain.clone();
-        chain.step = step;
-        let mut angles = Vec::new();
-        roll(&chain, base, recording, &[], Which::All, |row| {
-            let at = row.row * n;
-            let whitened = row.angle.iter().zip(&sigma[at..at + n]);
-            angles.extend(whitened.map(|(angle, sigma)| angle / sigma));
-        });
-        angles
-    };
-    let fine = rolled(STEP);
-    let near = |step: &f64| {
-        let mut squares = vec![0.0; n];
-        for (k, (a, b)) in rolled(*step).iter().zip(&fine).enumerate() {
-            squares[k % n] += (a - b).powi(2);
-        }
-        let rows = (fine.len() / n) as f64;
-        squares.iter().all(|square| *square < rows * SAME * SAME)
-    };
-    LONGER.into_iter().find(near).unwrap_or(STEP)
 }
 
 /// What the simulation as it is does.
@@ -315,11 +282,18 @@ impl Problem for Drives {
     }
 
     fn fit(&self, set: &[Accepted<Key>], before: Option<&DriveFit>, least: f64) -> DriveFit {
-        self.fitted_with(set, before, false, least)
+        match before {
+            Some(fit) => self.fitted_with(&self.begun(set, fit), before, false, least),
+            None => self.fitted_with(set, None, false, least),
+        }
     }
 
     fn settled(&self, fit: &DriveFit) -> DriveFit {
         self.fitted_with(&fit.set, Some(fit), true, f64::NEG_INFINITY)
+    }
+
+    fn serves(&self, fit: &DriveFit) -> bool {
+        self.is_fine_for_gears(fit)
     }
 
     fn set(&self, fit: &DriveFit) -> Vec<Accepted<Key>> {

@@ -4,7 +4,7 @@
 //! impulses, coupled over the joints by the inverse mass, stop what they can (projected Gauss-Seidel). Derivatives are those of the step.
 
 use crate::chain::{Chain, MOST, Posed, Row, Square, invert};
-use crate::columns::{Columns, Instant, StepMatrices};
+use crate::columns::{Columns, Instant, StepMatrices, StepParts};
 use crate::physics::{Commanded, LOAD_LAG, Motion, Physics, ROTOR_SHARE, SAG_LAG, Torque, slewed};
 use crate::recording::{Commands, Recording, Trajectory};
 
@@ -139,7 +139,7 @@ pub fn roll(
                 guess = commands.index(time, guess);
                 roller.advance(&commands, guess, time, time - trajectory.began, h);
             }
-            if !directions.is_empty() {
+            if !directions.is_empty() && !roller.columns.is_few() {
                 roller.columns.carry(&roller.rotor);
             }
         }
@@ -361,8 +361,12 @@ impl Roller<'_> {
             };
             self.columns
                 .ask(&at, self.chain, &self.posed, &a[..m], &ahead[..n]);
-            let step = self.linearised((&w, &stiff, &damp), &limit, h);
-            self.columns.push_step(step);
+            for j in 0..n {
+                for k in 0..n {
+                    stiff[j][k] += self.gravity[j][k];
+                }
+            }
+            self.linearised((&w, &stiff, &damp), &limit, h);
         }
         let total: f64 = driven[..n].iter().map(|drive| drive.abs()).sum();
         let lag = h / SAG_LAG;
@@ -421,72 +425,97 @@ impl Roller<'_> {
         new
     }
 
-    /// The step's derivative.
+    /// Carries the step's derivative on.
     fn linearised(
-        &self,
+        &mut self,
         (w, stiff, damp): (&Square, &Square, &Square),
         limit: &[[f64; 2]; MOST],
         h: f64,
-    ) -> StepMatrices {
+    ) {
         let m = self.freedoms;
         // What friction holds keeps its speed of zero.
-        let held: Vec<usize> = (0..m)
-            .filter(|i| {
-                let against = limit[*i][usize::from(self.push[*i] < 0.0)];
-                against > 0.0 && self.push[*i].abs() < 0.999_999 * h * against
-            })
-            .collect();
-        let mut keep = [[0.0; MOST]; MOST];
-        (0..m).for_each(|i| keep[i][i] = 1.0);
-        if !held.is_empty() {
-            let (mut inner, mut inverse) = ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST]);
-            for (a, i) in held.iter().enumerate() {
-                for (b, k) in held.iter().enumerate() {
+        let (mut held, mut count) = ([0; MOST], 0);
+        for i in 0..m {
+            let against = limit[i][usize::from(self.push[i] < 0.0)];
+            if against > 0.0 && self.push[i].abs() < 0.999_999 * h * against {
+                held[count] = i;
+                count += 1;
+            }
+        }
+        let mut inverse = [[0.0; MOST]; MOST];
+        if count > 0 {
+            let mut inner = [[0.0; MOST]; MOST];
+            for (a, i) in held[..count].iter().enumerate() {
+                for (b, k) in held[..count].iter().enumerate() {
                     inner[a][b] = w[*i][*k];
                 }
             }
-            if invert(&inner, held.len(), &mut inverse) {
-                for row in 0..m {
-                    for (b, k) in held.iter().enumerate() {
-                        let share: f64 = held
-                            .iter()
-                            .enumerate()
-                            .map(|(a, i)| w[row][*i] * inverse[a][b])
-                            .sum();
-                        keep[row][*k] -= share;
-                    }
-                }
+            if !invert(&inner, count, &mut inverse) {
+                count = 0;
             }
         }
-        let mut through = [[0.0; MOST]; MOST];
-        for i in 0..m {
-            for k in 0..m {
-                through[i][k] = (0..m).map(|j| keep[i][j] * w[j][k]).sum();
-            }
-        }
-        // new dv = keep dv + through h (f - K (dq + h/2 dv) - D dv)
-        let (mut by_speed, mut by_angle) = ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST]);
-        for i in 0..m {
-            for k in 0..m {
-                let (mut speed, mut angle) = (0.0, 0.0);
-                for j in 0..m {
-                    let whole = stiff[j][k] + self.gravity[j][k];
-                    angle -= through[i][j] * whole * h;
-                    speed -= through[i][j] * (0.5 * h * whole + damp[j][k]) * h;
-                }
-                by_angle[i][k] = angle;
-                by_speed[i][k] = keep[i][k] + speed;
-            }
-        }
-        for row in &mut through[..m] {
-            row[..m].iter_mut().for_each(|by| *by *= h);
-        }
-        StepMatrices {
-            by_speed,
-            by_angle,
-            by_torque: through,
+        let parts = StepParts {
+            w,
+            stiff,
+            damp,
+            held: &held[..count],
+            inner: &inverse,
             h,
+        };
+        if self.columns.is_few() {
+            self.columns.carry_step(&self.rotor, &parts);
+        } else {
+            self.columns.push_step(step_matrices(&parts, m));
         }
+    }
+}
+
+/// The step's derivative as matrices.
+fn step_matrices(parts: &StepParts, m: usize) -> StepMatrices {
+    let StepParts {
+        w,
+        stiff,
+        damp,
+        held,
+        inner,
+        h,
+    } = *parts;
+    let mut keep = [[0.0; MOST]; MOST];
+    (0..m).for_each(|i| keep[i][i] = 1.0);
+    for row in 0..m {
+        for (b, k) in held.iter().enumerate() {
+            let shares = held.iter().enumerate();
+            let share: f64 = shares.map(|(a, i)| w[row][*i] * inner[a][b]).sum();
+            keep[row][*k] -= share;
+        }
+    }
+    let mut through = [[0.0; MOST]; MOST];
+    for i in 0..m {
+        for k in 0..m {
+            through[i][k] = (0..m).map(|j| keep[i][j] * w[j][k]).sum();
+        }
+    }
+    // new dv = keep dv + through h (f - K (dq + h/2 dv) - D dv)
+    let (mut by_speed, mut by_angle) = ([[0.0; MOST]; MOST], [[0.0; MOST]; MOST]);
+    for i in 0..m {
+        for k in 0..m {
+            let (mut speed, mut angle) = (0.0, 0.0);
+            for j in 0..m {
+                angle -= through[i][j] * stiff[j][k] * h;
+                speed -= through[i][j] * (0.5 * h * stiff[j][k] + damp[j][k]) * h;
+            }
+            by_angle[i][k] = angle;
+            by_speed[i][k] = keep[i][k] + speed;
+        }
+    }
+    for row in &mut through[..m] {
+        row[..m].iter_mut().for_each(|by| *by *= h);
+    }
+    StepMatrices {
+        by_speed,
+        by_angle,
+        by_torque: through,
+        h,
     }
 }
 

@@ -167,6 +167,10 @@ pub trait Problem: Sync {
     fn settled(&self, fit: &Self::Fit) -> Self::Fit {
         fit.clone()
     }
+    /// Whether a fit is as exact as what was found asks for; where it is not a search ends before it asks what else each cell could be.
+    fn serves(&self, _fit: &Self::Fit) -> bool {
+        true
+    }
     /// The set with its numbers as fitted.
     fn set(&self, fit: &Self::Fit) -> Vec<Accepted<Self::Key>>;
     /// How far noise is from independent around a fit: effective rows a row.

@@ -49,6 +49,8 @@ pub struct Answer<P: Problem> {
     pub after: P::Fit,
     /// What stands, strongest first.
     pub findings: Vec<Finding<P::Key>>,
+    /// Whether the problem serves what was found; where it does not nothing is told of it.
+    pub is_served: bool,
 }
 
 /// Members of a place that one may replace at once: for a single one that is an exchange.
@@ -61,13 +63,19 @@ const BLUR_SHARE: f64 = 0.5;
 struct Stand<P: Problem> {
     fit: P::Fit,
     around: P::Around,
+    /// Whether the problem serves the fit; where it does not, what is seen may be that of an earlier one.
+    is_served: bool,
 }
 
 impl<P: Problem> Stand<P> {
     fn new(problem: &P, fit: P::Fit, before: Option<&P::Around>) -> Self {
         let around = problem.around(&fit, before);
         let fit = problem.informed(fit, &around);
-        Self { fit, around }
+        Self {
+            fit,
+            around,
+            is_served: true,
+        }
     }
 }
 
@@ -217,6 +225,13 @@ fn search<P: Problem>(
         let fit = problem.settled(&best.fit);
         let newest = problem.set(&fit).len().saturating_sub(1);
         let fit = revised(problem, fit, newest, options, tell);
+        if !problem.serves(&fit) {
+            return Stand {
+                fit,
+                is_served: false,
+                ..stand
+            };
+        }
         stand = Stand::new(problem, fit, Some(&stand.around));
     }
     stand
@@ -441,6 +456,9 @@ pub fn diagnose<P: Problem>(
     let mut stand = search(problem, begun, None, options, &mut tell);
     let mut exchanges = 0;
     let findings = loop {
+        if !stand.is_served {
+            break Vec::new();
+        }
         let until = match exchanges < options.exchanged {
             true => Until::Better,
             false => Until::Useless,
@@ -466,6 +484,7 @@ pub fn diagnose<P: Problem>(
     };
     Answer {
         before,
+        is_served: stand.is_served,
         after: stand.fit,
         findings,
     }
