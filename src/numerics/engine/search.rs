@@ -217,6 +217,10 @@ fn search<P: Problem>(
         let fit = problem.settled(&best.fit);
         let newest = problem.set(&fit).len().saturating_sub(1);
         let fit = revised(problem, fit, newest, options, tell);
+        // A fit to the end may lose what the trial promised: without a gain the same cells would come and go for ever.
+        if problem.log_evidence(&fit, independence) <= now {
+            break;
+        }
         stand = Stand::new(problem, fit, Some(&stand.around));
     }
     stand
@@ -468,5 +472,74 @@ pub fn diagnose<P: Problem>(
         before,
         after: stand.fit,
         findings,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Cause;
+
+    /// Two cells of which a trial has both, and a fit to the end only the newest.
+    struct OneOfTwo;
+
+    fn cell(key: usize) -> Accepted<usize> {
+        let cell = Cell {
+            key,
+            cause: Cause::named(["first", "second"][key]),
+            place: "here".into(),
+            log_prior: 0.0,
+            shapes: Vec::new(),
+            needs: Vec::new(),
+        };
+        Accepted {
+            cell,
+            shape: 0,
+            numbers: vec![1.0],
+        }
+    }
+
+    impl Problem for OneOfTwo {
+        type Key = usize;
+        type Fit = Vec<usize>;
+        type Around = ();
+
+        fn around(&self, _fit: &Vec<usize>, _before: Option<&()>) {}
+
+        fn scan(&self, fit: &Vec<usize>, _around: &(), _out: Option<usize>) -> Vec<Scanned<usize>> {
+            let missing = (0..2).filter(|key| !fit.contains(key));
+            let scanned = |key| Scanned {
+                accepted: cell(key),
+                log_odds: 10.0,
+            };
+            missing.map(scanned).collect()
+        }
+
+        fn fit(
+            &self,
+            set: &[Accepted<usize>],
+            _before: Option<&Vec<usize>>,
+            _least: f64,
+        ) -> Vec<usize> {
+            set.iter().map(|one| one.cell.key).collect()
+        }
+
+        fn settled(&self, fit: &Vec<usize>) -> Vec<usize> {
+            fit.last().copied().into_iter().collect()
+        }
+
+        fn set(&self, fit: &Vec<usize>) -> Vec<Accepted<usize>> {
+            fit.iter().map(|key| cell(*key)).collect()
+        }
+
+        fn log_evidence(&self, fit: &Vec<usize>, _independence: f64) -> f64 {
+            10.0 * fit.len() as f64
+        }
+    }
+
+    #[test]
+    fn cells_that_leave_when_another_is_fitted_to_the_end_do_not_come_and_go_for_ever() {
+        let answer = diagnose(&OneOfTwo, &[], &Options::default(), |_| ());
+        assert_eq!(answer.after.len(), 1);
     }
 }
