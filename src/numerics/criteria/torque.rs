@@ -19,7 +19,7 @@ criteria! {
     /// Standard deviations below which a number is not named.
     NAMED: f64 = 2.0, "standard deviations", "literature: 95 % of a normal law", "";
     /// How near (logarithm) a shape number is to an end of its search to be none.
-    AT_END: f64 = 0.02, "logarithm", "judgement: two per cent", "";
+    AT_END: f64 = 0.02, "logarithm", "count: the finest grid has steps of 0.003, the one before of 0.01", "";
     /// Greatest torque of one law of friction, one standard deviation beforehand, over half the range of its joint's torque.
     FRICTION: f64 = 1.0, "share", "physics: no law of friction alone is more than the whole torque", "";
     /// What a cause and nothing, or hypotheses about masses and about drives, must differ by to exclude each other: twice the logarithm of their

@@ -1,9 +1,8 @@
 //! Shape numbers of what was found (speeds, times, travels): all at once with the coefficients and the width over which the sign of friction
-//! turns, by steps of Gauss and Newton: one number after the other stays where two go together. Those that are as they usually are leave that
-//! only where rows are worth another number.
+//! turns, by steps of Gauss and Newton: one number after the other stays where two go together. Only those that are as they usually are, and
+//! starts of laws of a user's own, are looked for by finer and finer grids before.
 
 use super::cause::{SHARE, ShapeSpan, TorqueForm};
-use super::cells::all_but;
 use super::columns::TorqueColumn;
 use super::problem::{TorqueProblem, basic_forms};
 use super::recording::{add, square};
@@ -13,10 +12,12 @@ use super::weighted::WeightedColumns;
 use crate::criteria::torque::{BETTER, UNUSUAL};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Logarithm, or share of the number's size, by which another number is tried in place of the usual one.
-const UNUSUALLY: f64 = 0.3;
+/// Half widths of the grids: of the logarithm, or of the number itself.
+const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
+/// Points on either side.
+const POINTS: i32 = 3;
 
-/// Replaces forms of a set whose numbers are as they usually are by those with another number that are worth it; tells whether any was.
+/// Replaces forms of a set whose numbers are as they usually are by others where rows are worth that; tells whether any was.
 pub(super) fn refine(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
@@ -26,14 +27,33 @@ pub(super) fn refine(
     for place in 0..set.len() {
         let form = problem.all.forms[set[place]].clone();
         for span in (form.cause.spans)(&form) {
-            let shape = &problem.all.forms[set[place]].shape;
-            if span.usual == Some(shape[span.index]) {
-                try_unusual(problem, weighted, set, place, span);
+            if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
+                refine_number(problem, weighted, set, place, span);
             }
         }
     }
     before != set
 }
+
+/// The same of one number of the form at a place of a set.
+fn refine_number(
+    problem: &mut TorqueProblem,
+    weighted: &mut WeightedColumns,
+    set: &mut [usize],
+    place: usize,
+    span: ShapeSpan,
+) {
+    for half in HALVES {
+        try_grid(problem, weighted, set, place, span, half);
+        // What the coarsest grid leaves as it usually is stays so.
+        if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
+            break;
+        }
+    }
+}
+
+/// Rounds of grids from the best start of a law of a user's own.
+const OWN_ROUNDS: usize = 2;
 
 /// Lists laws of a user's own also in the shape in which each explains most at its joint in addition to viscous and Coulomb friction: a law
 /// between its starts would look like a sum of others. Products that were formed before are those of other columns then.
@@ -45,21 +65,21 @@ pub(super) fn list_own_shapes(problem: &mut TorqueProblem, mut weighted: Weighte
         form.cause.declared.is_some() && !form.shape.is_empty()
     };
     let own: Vec<usize> = (0..listed).filter(is_own).collect();
-    let (basic, width) = (basic_forms(problem), problem.scene.sign_width);
-    let mut found = Vec::new();
+    let (mut set, mut found) = (basic_forms(problem), Vec::new());
+    let place = set.len();
     for starts in own.chunk_by(|a, b| forms[*a].is_called_as(&forms[*b])) {
-        let sweep = SweptColumns::base(&problem.all, &weighted).with(&basic);
+        let sweep = SweptColumns::base(&problem.all, &weighted).with(&set[..place]);
         let gains = starts.iter().map(|start| (*start, sweep.gain(*start)));
         let Some((best, _)) = gains.max_by(|a, b| a.1.total_cmp(&b.1)) else {
             continue;
         };
-        let mut set = [&basic[..], &[best]].concat();
-        polish(problem, &mut weighted, &mut set);
-        found.push(problem.all.forms[set[basic.len()]].clone());
-        // How the sign turns was found for all joints.
-        problem.scene.sign_width = width;
-        problem.renew_signs(&basic);
-        weighted = problem.weighted(&[]);
+        set.truncate(place);
+        set.push(best);
+        let spans = (forms[best].cause.spans)(&forms[best]);
+        for span in (0..OWN_ROUNDS).flat_map(|_| spans.clone()) {
+            refine_number(problem, &mut weighted, &mut set, place, span);
+        }
+        found.push(problem.all.forms[set[place]].clone());
     }
     problem.all.forget(listed);
     for form in found {
@@ -68,18 +88,25 @@ pub(super) fn list_own_shapes(problem: &mut TorqueProblem, mut weighted: Weighte
     problem.all.listed = problem.all.forms.len();
 }
 
-/// Another number than the usual one.
-fn try_unusual(
+/// One grid about the present number.
+fn try_grid(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
     set: &mut [usize],
     place: usize,
     span: ShapeSpan,
+    half: f64,
 ) {
     let form = problem.all.forms[set[place]].clone();
     let now = form.shape[span.index];
-    let mut trials = Vec::new();
-    for step in [-UNUSUALLY, UNUSUALLY] {
+    let mut trials = vec![set[place]];
+    let is_usual = span.usual == Some(now);
+    let is_tried = |point: &i32| match is_usual {
+        true => point.abs() == POINTS,
+        false => *point != 0,
+    };
+    for point in (-POINTS..=POINTS).filter(is_tried) {
+        let step = half * f64::from(point) / f64::from(POINTS);
         let moved = match span.by_ratio {
             true => now * step.exp(),
             false => now + step * span.size(now),
@@ -88,12 +115,19 @@ fn try_unusual(
             trials.push(push(problem, weighted, form.with_shape(span.index, moved)));
         }
     }
-    let others = all_but(set, set[place]);
+    let others = set.iter().copied().enumerate();
+    let others = others.filter(|(other, _)| *other != place);
+    let others: Vec<usize> = others.map(|(_, form)| form).collect();
     let sweep = SweptColumns::base(&problem.all, weighted).with(&others);
-    let gains = trials.into_iter().map(|trial| (trial, sweep.gain(trial)));
-    let best = gains.max_by(|a, b| a.1.total_cmp(&b.1));
-    let least = sweep.gain(set[place]) + *UNUSUAL + (weighted.rows as f64).ln();
-    if let Some((best, _)) = best.filter(|(_, gain)| *gain > least) {
+    let gains = trials.iter().map(|number| (*number, sweep.gain(*number)));
+    let (best, gain) = gains
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .unwrap_or((set[place], 0.0));
+    let asked = match is_usual {
+        true => *UNUSUAL + (weighted.rows as f64).ln(),
+        false => *BETTER,
+    };
+    if gain > sweep.gain(set[place]) + asked {
         set[place] = best;
     }
 }

@@ -57,6 +57,9 @@ const SEVERAL: usize = 2;
 const BLUR: f64 = 20.0;
 const BLUR_SHARE: f64 = 0.5;
 
+/// Cells that may join in a search, of those that may stand.
+const ROUNDS: usize = 2;
+
 /// A model, and what is seen around it.
 struct Stand<P: Problem> {
     fit: P::Fit,
@@ -189,7 +192,11 @@ fn search<P: Problem>(
     tell: &mut impl FnMut(String),
 ) -> Stand<P> {
     let mut stand = Stand::new(problem, start, seen);
-    while problem.set(&stand.fit).len() < options.most {
+    // A fit to the end may lose what the trial promised: then the same cells would come and go for ever.
+    for _ in 0..ROUNDS * options.most {
+        if problem.set(&stand.fit).len() >= options.most {
+            break;
+        }
         let independence = problem.independence(&stand.fit);
         let now = problem.log_evidence(&stand.fit, independence);
         let set = problem.set(&stand.fit);
@@ -217,10 +224,6 @@ fn search<P: Problem>(
         let fit = problem.settled(&best.fit);
         let newest = problem.set(&fit).len().saturating_sub(1);
         let fit = revised(problem, fit, newest, options, tell);
-        // A fit to the end may lose what the trial promised: without a gain the same cells would come and go for ever.
-        if problem.log_evidence(&fit, independence) <= now {
-            break;
-        }
         stand = Stand::new(problem, fit, Some(&stand.around));
     }
     stand
