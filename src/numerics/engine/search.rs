@@ -59,6 +59,9 @@ const SEVERAL: usize = 2;
 const BLUR: f64 = 20.0;
 const BLUR_SHARE: f64 = 0.5;
 
+/// Cells that may join in a search, of those that may stand.
+const ROUNDS: usize = 2;
+
 /// A model, and what is seen around it.
 struct Stand<P: Problem> {
     fit: P::Fit,
@@ -197,7 +200,11 @@ fn search<P: Problem>(
     tell: &mut impl FnMut(String),
 ) -> Stand<P> {
     let mut stand = Stand::new(problem, start, seen);
-    while problem.set(&stand.fit).len() < options.most {
+    // A fit to the end may lose what the trial promised: then the same cells would come and go for ever.
+    for _ in 0..ROUNDS * options.most {
+        if problem.set(&stand.fit).len() >= options.most {
+            break;
+        }
         let independence = problem.independence(&stand.fit);
         let now = problem.log_evidence(&stand.fit, independence);
         let set = problem.set(&stand.fit);
@@ -487,5 +494,74 @@ pub fn diagnose<P: Problem>(
         is_served: stand.is_served,
         after: stand.fit,
         findings,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Cause;
+
+    /// Two cells of which a trial has both, and a fit to the end only the newest.
+    struct OneOfTwo;
+
+    fn cell(key: usize) -> Accepted<usize> {
+        let cell = Cell {
+            key,
+            cause: Cause::named(["first", "second"][key]),
+            place: "here".into(),
+            log_prior: 0.0,
+            shapes: Vec::new(),
+            needs: Vec::new(),
+        };
+        Accepted {
+            cell,
+            shape: 0,
+            numbers: vec![1.0],
+        }
+    }
+
+    impl Problem for OneOfTwo {
+        type Key = usize;
+        type Fit = Vec<usize>;
+        type Around = ();
+
+        fn around(&self, _fit: &Vec<usize>, _before: Option<&()>) {}
+
+        fn scan(&self, fit: &Vec<usize>, _around: &(), _out: Option<usize>) -> Vec<Scanned<usize>> {
+            let missing = (0..2).filter(|key| !fit.contains(key));
+            let scanned = |key| Scanned {
+                accepted: cell(key),
+                log_odds: 10.0,
+            };
+            missing.map(scanned).collect()
+        }
+
+        fn fit(
+            &self,
+            set: &[Accepted<usize>],
+            _before: Option<&Vec<usize>>,
+            _least: f64,
+        ) -> Vec<usize> {
+            set.iter().map(|one| one.cell.key).collect()
+        }
+
+        fn settled(&self, fit: &Vec<usize>) -> Vec<usize> {
+            fit.last().copied().into_iter().collect()
+        }
+
+        fn set(&self, fit: &Vec<usize>) -> Vec<Accepted<usize>> {
+            fit.iter().map(|key| cell(*key)).collect()
+        }
+
+        fn log_evidence(&self, fit: &Vec<usize>, _independence: f64) -> f64 {
+            10.0 * fit.len() as f64
+        }
+    }
+
+    #[test]
+    fn cells_that_leave_when_another_is_fitted_to_the_end_do_not_come_and_go_for_ever() {
+        let answer = diagnose(&OneOfTwo, &[], &Options::default(), |_| ());
+        assert_eq!(answer.after.len(), 1);
     }
 }
