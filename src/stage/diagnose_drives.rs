@@ -232,7 +232,7 @@ impl ClockUnit {
 }
 
 crate::stage! {
-    DiagnoseDrives, "diagnose_drives", 9, "names the physics that the simulation of commanded joints lacks, from commands and angles",
+    DiagnoseDrives, "diagnose_drives", 10, "names the physics that the simulation of commanded joints lacks, from commands and angles",
         DiagnoseDrivesReads {} -> DiagnoseDrivesWrites {
             verdict: DriveVerdict,
             sentences: VerdictSentences,

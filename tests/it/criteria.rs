@@ -22,7 +22,7 @@ const ROOMS: [&str; 3] = [
 ];
 
 /// Numbers of those rooms that decide nothing: how work is dealt out, steps and bounds of solvers and of grids, roundings, units.
-const MECHANICS: [&str; 41] = [
+const MECHANICS: [&str; 42] = [
     "AMPLITUDES",
     "ANGLE",
     "ANY",
@@ -34,6 +34,7 @@ const MECHANICS: [&str; 41] = [
     "CHUNK",
     "COLUMNS",
     "FARTHEST",
+    "FEW",
     "FINE",
     "FITTED",
     "FOLDS",

@@ -300,6 +300,7 @@ fn folders_of_robots_may_be_named_from_the_root() {
         "far",
         &format!("robots:\n  - folders: {}/*\n", cells.display()),
     );
-    let (_, printed) = output(&mut fleet("status", &file, &folder.path().join("store")));
-    has(&printed, "fleet far: 0 of 2 robots done");
+    let (result, _) = output(&mut fleet("status", &file, &folder.path().join("store")));
+    let text = String::from_utf8(result.stdout).unwrap();
+    has(&text, "fleet far: 0 of 2 robots done");
 }

@@ -126,7 +126,7 @@ fn missing_physics_is_named_from_arrays() {
         "{answer}"
     );
     let statement = finding["statement"].as_str().unwrap_or_default();
-    has(statement, "5 times a turn by 21 arcsec");
+    has(statement, "5 times a turn by 20.8 arcsec");
 }
 
 #[test]

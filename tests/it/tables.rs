@@ -146,7 +146,7 @@ macro_rules! kinds {
         }
     };
 }
-kinds! { Acceptance BodyConsistencies CellEvidence Cells Changes Contacts JointConventions Corrections CovarianceTable Curves Document DriveCourse DriveSimulation DriveVerdict FindingNumbers Findings Fit FleetTable FleetCells FleetChanges FleetFindings FleetOutliers Forms FrictionCurves Inertials Intake JointDrives JointTorques ArmMotion Network Observability Parameters Prediction Recording Rejected Rivals Robot Scoreboard SearchCourse Searches Shares Spectrum Split
+kinds! { Acceptance BodyConsistencies CellAmplitudes CellEvidence Cells Changes Contacts JointConventions Corrections CovarianceTable Curves Document DriveCourse DriveSimulation DriveVerdict FindingNumbers Findings Fit FleetTable FleetCells FleetChanges FleetFindings FleetOutliers Forms FrictionCurves Inertials Intake JointDrives JointTorques ArmMotion Network Observability Parameters Prediction Recording Rejected Rivals Robot Scoreboard SearchCourse Searches Shares Spectrum Split
 Statistics Suspects TorqueChangeTable TorqueCourse TorqueCovariance TorqueFindings TorqueNumbers TorqueParameters TorqueRivals TorqueVerdict Training Truth Verdict VerdictSentences }
 
 #[test]

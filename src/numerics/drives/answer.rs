@@ -120,7 +120,7 @@ pub fn diagnose(
         let found = searched.physics(&answer.after.inertia, &answer.after.set);
         let coarse = searched.coarseness(&found);
         let odds = answer.findings.iter().map(|one| one.log_odds);
-        if answer.is_served && searched.exceed(odds, &answer.after, coarse.square) {
+        if answer.is_accurate && searched.exceed(odds, &answer.after, coarse.square) {
             break answer;
         }
         let finer = searched.finer(&found, &coarse);

@@ -292,7 +292,7 @@ impl Problem for Drives {
         self.fitted_with(&fit.set, Some(fit), true, f64::NEG_INFINITY)
     }
 
-    fn serves(&self, fit: &DriveFit) -> bool {
+    fn is_accurate(&self, fit: &DriveFit) -> bool {
         self.is_fine_for_gears(fit)
     }
 

@@ -167,8 +167,9 @@ pub trait Problem: Sync {
     fn settled(&self, fit: &Self::Fit) -> Self::Fit {
         fit.clone()
     }
-    /// Whether a fit is as exact as what was found asks for; where it is not a search ends before it asks what else each cell could be.
-    fn serves(&self, _fit: &Self::Fit) -> bool {
+    /// Whether a fit is computed as accurately (by steps as short) as what was found asks for; where it is not, a search ends before it asks what
+    /// else each cell could be.
+    fn is_accurate(&self, _fit: &Self::Fit) -> bool {
         true
     }
     /// The set with its numbers as fitted.

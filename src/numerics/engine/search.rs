@@ -49,8 +49,8 @@ pub struct Answer<P: Problem> {
     pub after: P::Fit,
     /// What stands, strongest first.
     pub findings: Vec<Finding<P::Key>>,
-    /// Whether the problem serves what was found; where it does not nothing is told of it.
-    pub is_served: bool,
+    /// Whether its fits are accurate enough for what was found; there are no findings where they are not.
+    pub is_accurate: bool,
 }
 
 /// Members of a place that one may replace at once: for a single one that is an exchange.
@@ -66,8 +66,8 @@ const ROUNDS: usize = 2;
 struct Stand<P: Problem> {
     fit: P::Fit,
     around: P::Around,
-    /// Whether the problem serves the fit; where it does not, what is seen may be that of an earlier one.
-    is_served: bool,
+    /// Whether the fit is accurate enough; where it is not, the linearisation is that of an earlier one.
+    is_accurate: bool,
 }
 
 impl<P: Problem> Stand<P> {
@@ -77,7 +77,7 @@ impl<P: Problem> Stand<P> {
         Self {
             fit,
             around,
-            is_served: true,
+            is_accurate: true,
         }
     }
 }
@@ -232,10 +232,10 @@ fn search<P: Problem>(
         let fit = problem.settled(&best.fit);
         let newest = problem.set(&fit).len().saturating_sub(1);
         let fit = revised(problem, fit, newest, options, tell);
-        if !problem.serves(&fit) {
+        if !problem.is_accurate(&fit) {
             return Stand {
                 fit,
-                is_served: false,
+                is_accurate: false,
                 ..stand
             };
         }
@@ -463,7 +463,7 @@ pub fn diagnose<P: Problem>(
     let mut stand = search(problem, begun, None, options, &mut tell);
     let mut exchanges = 0;
     let findings = loop {
-        if !stand.is_served {
+        if !stand.is_accurate {
             break Vec::new();
         }
         let until = match exchanges < options.exchanged {
@@ -491,7 +491,7 @@ pub fn diagnose<P: Problem>(
     };
     Answer {
         before,
-        is_served: stand.is_served,
+        is_accurate: stand.is_accurate,
         after: stand.fit,
         findings,
     }

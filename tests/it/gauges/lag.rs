@@ -62,7 +62,7 @@ fn a_lag_of_a_synchronous_motion_is_shared_out_as_the_moves_are() {
     assert!((remaining / 90.0 - 1.0).abs() < 0.05, "{statement}");
     has(
         &statement,
-        "the joint that moved most had 90 arcsec still to come",
+        "the joint that moved most had 90.3 arcsec still to come",
     );
 }
 

@@ -58,13 +58,10 @@ pub struct CellAnswer {
 }
 
 impl CellAnswer {
-    /// The same with its evidence at each amplitude, by that of its columns and ln of their weight in it. What they say at the smallest one, which
-    /// moves nothing that is seen, as masses that motor currents show may, speaks for no cause.
+    /// The same with its evidence at each amplitude, by that of its columns and ln of the weight of all shapes that could have any.
     pub fn at(self, amplitudes: [f64; AMPLITUDES], log_weight: f64) -> Self {
-        let [least, ..] = amplitudes;
-        let least = if least.is_finite() { least } else { log_weight };
         Self {
-            at_amplitudes: amplitudes.map(|log| log - least),
+            at_amplitudes: amplitudes.map(|log| log - log_weight),
             ..self
         }
     }
@@ -254,10 +251,13 @@ impl CauseTable<'_, '_> {
         // What moves the tool by less than anything sees, as masses that motor currents show may, is no cause of its errors.
         let is_seen =
             |whole: &CellAnswer| whole.size > *SMALLEST || whole.size > 0.0 && whole.log <= 0.0;
+        // Of a given cell itself it is always asked what it says.
+        let is_own = |whole: &CellAnswer| left_out == Some(whole.cell.as_str());
         let written =
             |(k, (whole, mut shapes)): (usize, (CellAnswer, Vec<(usize, CellAnswer)>))| {
                 shapes.retain(|(_, shape)| shape.counts());
-                if !whole.counts() && shapes.is_empty() {
+                let is_written = |one: &CellAnswer| one.counts() || is_own(one);
+                if !is_written(&whole) && shapes.is_empty() {
                     return Vec::new();
                 }
                 let block = &self.coarse[cells[k]];
@@ -267,19 +267,19 @@ impl CauseTable<'_, '_> {
                     true => self.at_amplitudes(self.fine(cells[k]), state),
                     false => log_sums(groups.values().copied()),
                 };
-                let all = whole.at(all, 0.0);
+                let all = whole.at(all, self.log_weight(cells[k]));
                 let shapes = shapes.into_iter().filter_map(|(group, shape)| {
                     let weight = shape.log_prior;
                     Some(shape.at(*groups.get(&group)?, weight))
                 });
                 std::iter::once(all)
-                    .filter(CellAnswer::counts)
+                    .filter(is_written)
                     .chain(shapes)
                     .collect()
             };
         out.into_par_iter()
             .enumerate()
-            .filter(|(_, (whole, _))| whole.log.is_finite() && is_seen(whole))
+            .filter(|(_, (whole, _))| whole.log.is_finite() && (is_seen(whole) || is_own(whole)))
             .flat_map_iter(written)
             .collect()
     }
@@ -296,7 +296,8 @@ impl CauseTable<'_, '_> {
         let own = match alone {
             Some((log, _)) => {
                 let block = CellColumns::of_component(component, self.frame);
-                CellAnswer { log, ..own }.at(self.at_amplitudes(&block, state), 0.0)
+                let weight = self.log_weight(component.cell);
+                CellAnswer { log, ..own }.at(self.at_amplitudes(&block, state), weight)
             }
             None => own,
         };
@@ -310,6 +311,13 @@ impl CauseTable<'_, '_> {
             log_ratio: Some(found_size.log_ratio),
             ..own
         })
+    }
+
+    /// ln of the weight of all shapes of a cell.
+    fn log_weight(&self, cell: usize) -> f64 {
+        let groups = self.coarse[cell].groups.iter();
+        let shapes = groups.flat_map(|seen| &seen.group.shapes);
+        log_sum(&shapes.map(|shape| shape.log_weight).collect::<Vec<_>>())
     }
 
     /// ln of the evidence of all shapes of a block together at each amplitude.
