@@ -18,6 +18,10 @@ criteria! {
     PAUSE: f64 = 6.0, "periods", "judgement: what a smooth course bridges", "";
     /// Standard deviations below which a number is not named.
     NAMED: f64 = 2.0, "standard deviations", "literature: 95 % of a normal law", "";
+    /// Blocks in time of the fitted rows, each predicted by the others.
+    BLOCKS: usize = 5, "blocks", "count: without them errors of a UR10 are 0.145 for 0.104", "";
+    /// By how much each column of a cause without a name must lower the whitened squared error of the blocks.
+    CONFIRMED: f64 = 3.0, "square", "judgement: a number that explains nothing loses one", "";
     /// How near (logarithm) a shape number is to an end of its search to be none.
     AT_END: f64 = 0.02, "logarithm", "count: the finest grid has steps of 0.003, the one before of 0.01", "";
     /// Greatest torque of one law of friction, one standard deviation beforehand, over half the range of its joint's torque.

@@ -66,7 +66,8 @@ pub(super) struct TorqueProblem<'a> {
     held_out: Vec<bool>,
     pub(crate) events: Vec<ContactEvent>,
     pub(crate) noise: Vec<JointNoise>,
-    /// Causes at their places that are none: only a number at an end of its search would explain the torques.
+    /// Causes at their places that are none: only a number at an end of its search would explain the torques, or cross-validation
+    /// did not confirm them.
     pub(crate) barred: Vec<TorqueForm>,
     /// Laws of a user's own.
     own: Vec<DeclaredTorque>,

@@ -1,6 +1,5 @@
-//! Shape numbers of what was found (speeds, times, travels): all at once with the coefficients and the width over which the sign of friction
-//! turns, by steps of Gauss and Newton: one number after the other stays where two go together. Only those that are as they usually are, and
-//! starts of laws of a user's own, are looked for by finer and finer grids before.
+//! Shape numbers of what was found (speeds, times, travels): finer and finer grids about each, then all at once with the coefficients and the
+//! width over which the sign of friction turns, by steps of Gauss and Newton: one number after the other stays where two go together.
 
 use super::cause::{SHARE, ShapeSpan, TorqueForm};
 use super::columns::TorqueColumn;
@@ -17,7 +16,7 @@ const HALVES: [f64; 4] = [0.3, 0.1, 0.03, 0.01];
 /// Points on either side.
 const POINTS: i32 = 3;
 
-/// Replaces forms of a set whose numbers are as they usually are by others where rows are worth that; tells whether any was.
+/// Replaces forms of a set by better shaped ones; tells whether any was.
 pub(super) fn refine(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
@@ -25,29 +24,26 @@ pub(super) fn refine(
 ) -> bool {
     let before = set.to_vec();
     for place in 0..set.len() {
-        let form = problem.all.forms[set[place]].clone();
-        for span in (form.cause.spans)(&form) {
-            if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
-                refine_number(problem, weighted, set, place, span);
-            }
-        }
+        refine_at(problem, weighted, set, place);
     }
     before != set
 }
 
-/// The same of one number of the form at a place of a set.
-fn refine_number(
+/// The same of the form at one place of a set.
+fn refine_at(
     problem: &mut TorqueProblem,
     weighted: &mut WeightedColumns,
     set: &mut [usize],
     place: usize,
-    span: ShapeSpan,
 ) {
-    for half in HALVES {
-        try_grid(problem, weighted, set, place, span, half);
-        // What the coarsest grid leaves as it usually is stays so.
-        if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
-            break;
+    let form = &problem.all.forms[set[place]];
+    for span in (form.cause.spans)(form) {
+        for half in HALVES {
+            try_grid(problem, weighted, set, place, span, half);
+            // What the coarsest grid leaves as it usually is stays so.
+            if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
+                break;
+            }
         }
     }
 }
@@ -75,9 +71,8 @@ pub(super) fn list_own_shapes(problem: &mut TorqueProblem, mut weighted: Weighte
         };
         set.truncate(place);
         set.push(best);
-        let spans = (forms[best].cause.spans)(&forms[best]);
-        for span in (0..OWN_ROUNDS).flat_map(|_| spans.clone()) {
-            refine_number(problem, &mut weighted, &mut set, place, span);
+        for _ in 0..OWN_ROUNDS {
+            refine_at(problem, &mut weighted, &mut set, place);
         }
         found.push(problem.all.forms[set[place]].clone());
     }

@@ -1,5 +1,6 @@
 //! Torques as a problem of the one engine: a fit is a set of forms with their amplitudes, given the base, the noise and the shapes of the forms.
 
+use super::cause::{TORQUE_CONSTANT, TorqueForm};
 use super::cells::{CauseChoice, TorqueComponent, TorqueTable, forms, without};
 use crate::criteria::cells::{RIVAL, SWAPS};
 use crate::criteria::torque::{APART, COMPONENTS, EXCHANGES, USUAL};
@@ -231,6 +232,34 @@ fn options() -> Options {
         regroups: false,
         ..Options::default()
     }
+}
+
+/// The best set from viscous and Coulomb friction of every joint. One factor on the whole torque of each joint is tried before masses, and preferred where it
+/// explains as much.
+pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
+    let table = TorqueTable::new(choice);
+    let is_drive = |form: &TorqueForm| form.cause.name == TORQUE_CONSTANT;
+    let has_masses = |fit: &TorqueFit| {
+        choice.has(&forms(&fit.components), |form| {
+            form.cause.inertial && !is_drive(form)
+        })
+    };
+    let masses = table.searched(&choice.common());
+    let drives = (0..choice.open).filter(|number| {
+        let form = choice.form(*number);
+        is_drive(form) && form.shape.is_empty()
+    });
+    let start: Vec<usize> = choice.common().into_iter().chain(drives).collect();
+    if !has_masses(&masses) || start == choice.common() {
+        return forms(&masses.components);
+    }
+    let scaled = table.searched(&start);
+    let most = match has_masses(&scaled) {
+        true => 0.0,
+        false => 0.5 * *APART,
+    };
+    let is_scaled = masses.log - scaled.log <= most;
+    forms(&if is_scaled { scaled } else { masses }.components)
 }
 
 /// The best set from a start.

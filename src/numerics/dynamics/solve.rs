@@ -1,7 +1,8 @@
 //! The steps of a diagnosis of torques, one after the other.
 
 use super::arm::DynamicArm;
-use super::cells::CauseChoice;
+use super::cause::UNKNOWN;
+use super::cells::{CauseChoice, all_but};
 use super::contact::contacts;
 use super::latency::{Latency, latency, take_friction_lead};
 use super::problem::{
@@ -12,14 +13,18 @@ use super::recording::{RecordingClock, TorqueRecording};
 use super::refine::{
     ShapeSlopes, list_own_shapes, polish, refine, take_out_ends, take_sign_widths,
 };
-use super::search::{faint, priors, search};
+use super::search::{faint, from_common, priors, search};
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
 use super::weighted::{NoiseMemory, WeightedColumns};
-use crate::criteria::torque::NAMED;
+use crate::criteria::torque::{BLOCKS, CONFIRMED, NAMED};
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// Rounds in which others are looked for in place of forms with a number at an end of its search, at most.
 const END_ROUNDS: usize = 3;
+/// Rounds in which others are looked for in place of what does not predict rows that are left out, at most.
+const CONFIRMED_ROUNDS: usize = 6;
 /// Rounds in which a latency and the lead of friction find each other, at most.
 const CLOCK_ROUNDS: usize = 4;
 
@@ -63,8 +68,7 @@ pub(super) fn solve<'a>(
         list_own_shapes(&mut problem, weighted);
     }
     let mut weighted = problem.weighted(&[]);
-    let choice = CauseChoice::named(&problem, &weighted);
-    let mut set = search(&choice, &choice.common());
+    let mut set = from_common(&CauseChoice::named(&problem, &weighted));
     tell(explained_by(&problem, &set));
     refine(&mut problem, &mut weighted, &mut set);
     set = again(&mut problem, &mut weighted, set);
@@ -81,6 +85,21 @@ pub(super) fn solve<'a>(
         polish(&mut problem, &mut weighted, &mut set);
     }
     weighted = problem.weighted(&set);
+    for _ in 0..CONFIRMED_ROUNDS {
+        let choice = CauseChoice::new(&problem, &weighted);
+        let leave = unconfirmed(&choice, &set, &priors(&choice, &set));
+        if leave.is_empty() {
+            break;
+        }
+        set.retain(|form| !leave.contains(form));
+        for form in leave {
+            problem.barred.push(problem.all.forms[form].clone());
+        }
+        // Something else may be in their place.
+        set = again(&mut problem, &mut weighted, set);
+        polish(&mut problem, &mut weighted, &mut set);
+        weighted = problem.weighted(&set);
+    }
     let named = set.len();
     set.extend(CauseChoice::new(&problem, &weighted).other_friction(&set));
     weighted = problem.weighted_of(&set);
@@ -186,4 +205,110 @@ fn explained_by(problem: &TorqueProblem, set: &[usize]) -> String {
         format!("{} {}", form.cause.name, form.place)
     });
     format!("explained by {}", names.collect::<Vec<_>>().join(", "))
+}
+
+/// A column of which less than this share is new adds nothing.
+const REDUNDANT: f64 = 1e-9;
+
+/// A block of rows in time, and what is fitted to all others.
+struct Fold {
+    left_out: Vec<Range<usize>>,
+    others: WeightedColumns,
+}
+
+impl Fold {
+    /// The blocks of the fitted rows, with 1 / variance beforehand of columns of a set.
+    fn all(problem: &TorqueProblem, set: &[usize], priors: &[(usize, f64)]) -> Vec<Self> {
+        let runs = problem.runs(false);
+        let rows: usize = runs.iter().map(Range::len).sum();
+        let base = problem
+            .all
+            .prior
+            .iter()
+            .copied()
+            .enumerate()
+            .take(problem.all.base);
+        let of_set = set.iter().flat_map(|form| problem.all.of(*form));
+        let of_set = of_set.map(|column| (column, problem.all.prior[column]));
+        let known: Vec<(usize, f64)> = base.chain(of_set).collect();
+        let fold = |block: usize| {
+            let [first, last] = [block, block + 1].map(|block| rows * block / *BLOCKS);
+            let others = [between(&runs, 0..first), between(&runs, last..rows)].concat();
+            let mut others = problem.weighted_by(problem.weighing(&others), set);
+            others.know(&known);
+            others.know(priors);
+            Self {
+                left_out: between(&runs, first..last),
+                others,
+            }
+        };
+        (0..*BLOCKS).map(fold).collect()
+    }
+
+    /// Whitened errors of the rows that are left out; none where the others do not determine the model.
+    fn errors(&self, problem: &TorqueProblem, set: &[usize]) -> Option<Vec<f64>> {
+        let columns = problem.all.with_base(set);
+        let count = columns.len();
+        let mut gram = DMatrix::from_fn(count, count, |a, b| {
+            self.others.gram[columns[a]][columns[b]]
+        });
+        (0..count).for_each(|k| gram[(k, k)] += REDUNDANT * gram[(k, k)] + f64::MIN_POSITIVE);
+        let right = DVector::from_fn(count, |k, _| self.others.right[columns[k]]);
+        let values = gram.cholesky()?.solve(&right);
+        let solution: Vec<(usize, f64)> = columns.into_iter().zip(values.iter().copied()).collect();
+        let left_out = problem.weighing(&self.left_out);
+        Some(left_out.measured(&problem.residual(&solution)).concat())
+    }
+}
+
+/// The parts of runs that lie between two rows, counted over all of them.
+fn between(runs: &[Range<usize>], rows: Range<usize>) -> Vec<Range<usize>> {
+    let (mut passed, mut parts) = (0, Vec::new());
+    for run in runs {
+        let first = rows.start.clamp(passed, passed + run.len());
+        let last = rows.end.clamp(passed, passed + run.len());
+        if first < last {
+            parts.push(run.start + first - passed..run.start + last - passed);
+        }
+        passed += run.len();
+    }
+    parts
+}
+
+/// What of a set has no name and does not predict rows that are left out as it would if it were right; the worst goes first, and the others are
+/// asked without it. Coefficients have such 1 / variances beforehand.
+fn unconfirmed(choice: &CauseChoice, set: &[usize], priors: &[(usize, f64)]) -> Vec<usize> {
+    let folds = Fold::all(choice.problem, set, priors);
+    let (mut set, mut leave) = (set.to_vec(), Vec::new());
+    loop {
+        let asked = set.iter().copied();
+        let asked = asked.filter(|form| choice.form(*form).cause.name == UNKNOWN);
+        let short = asked.map(|form| (form, short(choice, &folds, &set, form)));
+        let worst = short.filter(|(_, short)| *short < 0.0);
+        let Some((worst, _)) = worst.min_by(|a, b| a.1.total_cmp(&b.1)) else {
+            return leave;
+        };
+        set.retain(|form| *form != worst);
+        leave.push(worst);
+    }
+}
+
+/// What rows that are left out gain by a form of a set, less what they would if it were right, whitened squares.
+fn short(choice: &CauseChoice, folds: &[Fold], set: &[usize], form: usize) -> f64 {
+    let others = all_but(set, form);
+    let (mut gain, mut expected) = (0.0, 0.0);
+    for fold in folds {
+        let [Some(whole), Some(without)] =
+            [set, &others].map(|set| fold.errors(choice.problem, set))
+        else {
+            continue;
+        };
+        for (without, with) in without.iter().zip(&whole) {
+            gain += without * without - with * with;
+            expected += (without - with).powi(2);
+        }
+    }
+    // The gain of a right cause scatters about its own square by twice its root.
+    let scatter = *NAMED * 2.0 * expected.sqrt();
+    gain - (expected - scatter).min(*CONFIRMED * choice.form(form).width as f64)
 }

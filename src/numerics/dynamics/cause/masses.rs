@@ -620,7 +620,7 @@ mod tests {
         assert_eq!(names, ["centre_x", "centre_z"]);
         let said = (LINK_CENTRE.statement)(&form, &fitted, |unit| unit);
         assert!(
-            said.contains("21.0 mm along x and 1.0 mm along z") && said.ends_with("is not seen"),
+            said.contains("21.0 mm along x and 1 mm along z") && said.ends_with("is not seen"),
             "{said}"
         );
     }
@@ -640,7 +640,7 @@ mod tests {
         let told = (LINK_INERTIA.parameters)(&form, &fitted);
         assert_eq!((told.len(), told[0].name.as_str()), (1, "inertia_yy"));
         assert!(
-            (LINK_INERTIA.statement)(&form, &fitted, |unit| unit).contains("by up to 0.300 kg m2")
+            (LINK_INERTIA.statement)(&form, &fitted, |unit| unit).contains("by up to 0.30 kg m2")
         );
     }
 }

@@ -23,7 +23,7 @@ pub use friction::COULOMB;
 pub(super) use friction::{
     COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power, of_greatest_load,
 };
-pub(super) use masses::{ADDED_MASS, CENTRE, PAYLOAD, ROTOR, masses_on_links};
+pub(super) use masses::{ADDED_MASS, CENTRE, PAYLOAD, ROTOR, TORQUE_CONSTANT, masses_on_links};
 
 /// A fitted number of a finding.
 #[derive(Debug, Clone, PartialEq)]
