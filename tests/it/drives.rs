@@ -496,13 +496,13 @@ fn a_text_of_a_german_spreadsheet_is_read_and_pauses_of_its_stamps_part_trajecto
         assert!(pipeline.contains(line), "expected `{line}` in {pipeline}");
     }
     let drives = json!({ "command_rate_hz": 100.0, "joints": plain.drives["joints"] });
-    put(&case.path().join("arm"), "drives.json", drives.to_string());
+    put(case.path().join("arm"), "drives.json", drives.to_string());
     let found = calib(case.path(), "diagnose arm/pipeline.yaml --store store");
     assert_eq!(found.code, Some(0), "{}", found.both());
     let pause = "1 pause of more than 0.5 s in the stamps; a trajectory begins anew after each";
     assert!(found.err.contains(pause), "{}", found.err);
     let pointed = pipeline.replace("        decimal: comma\n", "");
-    put(&case.path().join("arm"), "pointed.yaml", pointed);
+    put(case.path().join("arm"), "pointed.yaml", pointed);
     let refused = calib(case.path(), "diagnose arm/pointed.yaml --store store");
     assert!(
         refused.err.contains("`text: {decimal: comma}`"),

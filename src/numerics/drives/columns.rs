@@ -249,8 +249,8 @@ impl<'a> Columns<'a> {
             }
             for i in 0..m {
                 angle[i] += 0.5 * h * (speed[i] + new[i]);
-                speed[i] = new[i];
             }
+            speed[..m].copy_from_slice(&new[..m]);
         }
         self.pushes.clear();
         self.weights.clear();

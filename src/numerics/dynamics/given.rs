@@ -156,12 +156,12 @@ impl TorqueTable<'_, '_> {
             let at = self.at_amplitudes(form, state);
             (shape_key(self.choice.form(form)), (log, at))
         });
-        let joining: Vec<(String, (f64, [f64; AMPLITUDES]))> = joining.collect();
+        let joining: Vec<(String, FormEvidence)> = joining.collect();
         let all = log_sums(joining.iter().map(|(_, (_, at))| *at));
         let whole = self.whole_answer(best.form, log_odds, size, left_out);
         let whole = whole.at(all, self.log_count(cell));
         // Forms of each shape, and ln of the evidence of those that may be.
-        let mut shapes: BTreeMap<String, (usize, Vec<(f64, [f64; AMPLITUDES])>)> = BTreeMap::new();
+        let mut shapes: BTreeMap<String, (usize, Vec<FormEvidence>)> = BTreeMap::new();
         for form in self.open(cell) {
             let key = shape_key(self.choice.form(form));
             shapes.entry(key).or_default().0 += 1;
@@ -213,6 +213,9 @@ impl TorqueTable<'_, '_> {
         })
     }
 }
+
+/// ln of the evidence of a form, and at each amplitude.
+type FormEvidence = (f64, [f64; AMPLITUDES]);
 
 /// No amplitude is too small or too large.
 const ANY: [f64; 2] = [0.0, f64::INFINITY];
