@@ -104,7 +104,7 @@ def test_a_cause_is_named_from_arrays_in_ten_lines(diagnosis):
     truth = json.loads((EXAMPLE / "truth.json").read_text())["concealed"]["r01"][0]
     found = diagnosis.findings[0]
     assert (diagnosis.verdict, found["effect"], found["where"]) == ("explained", truth["effect"], truth["where"])
-    assert "steps by 18 arcsec" in str(diagnosis)
+    assert "steps by 17.9 arcsec" in str(diagnosis)
     assert diagnosis._repr_html_().startswith("<iframe srcdoc=") and "zero shift" in diagnosis.html
     assert len(diagnosis.rivals) >= 1 and "follows" in diagnosis.cells.columns
 
