@@ -1,6 +1,6 @@
 //! What the sums of a fleet mean: causes of groups with their size, spread and trend; robots that lack one, or have another size, or one alone.
 
-use super::cause_sums::{CellSays, CellTotal, GroupSums, each};
+use super::cause_sums::{CellProfile, CellTotal, GroupSums, each};
 use super::ledger::{Ending, RobotRecord};
 use super::round::Round;
 use super::{Fleet, Ledger};
@@ -44,7 +44,7 @@ pub(super) fn of(
         let group = round.by.of(&robot.groups).to_string();
         let given = round.groups.get(&group).map_or(&[][..], Vec::as_slice);
         sums.entry(group.clone()).or_default().add(cells, given);
-        for CellSays { row, .. } in cells {
+        for CellProfile { row, .. } in cells {
             let Some(sigma) = row.sigma else { continue };
             follows
                 .entry(row.cell.clone())

@@ -80,9 +80,9 @@ static UNWRITTEN: LazyLock<[Grid; 2]> = LazyLock::new(|| {
     })
 });
 
-/// What a cell, or a shape of it, says of a robot.
+/// The evidence of a robot for a cell, or a shape of it, over its amplitude.
 #[derive(Debug, Clone)]
-pub(super) struct CellSays {
+pub(super) struct CellProfile {
     pub(super) row: CellEvidenceRow,
     /// ln of its evidence at each amplitude.
     pub(super) at: [f64; STEPS],
@@ -130,7 +130,7 @@ impl Sum {
         }
     }
 
-    fn add(&mut self, CellSays { row, at }: &CellSays, owner: f64) {
+    fn add(&mut self, CellProfile { row, at }: &CellProfile, owner: f64) {
         let log = row.log_evidence.max(*LEAST_EVIDENCE);
         let less = owner - log;
         for (sum, value) in self.less.iter_mut().zip([1.0, less, less * less]) {
@@ -244,25 +244,25 @@ impl CellTotal<'_> {
 
 impl GroupSums {
     /// Takes a robot that was asked with some given cells.
-    pub(crate) fn add(&mut self, cells: &[CellSays], given: &[Given]) {
+    pub(crate) fn add(&mut self, cells: &[CellProfile], given: &[Given]) {
         self.robots += 1;
         let mut logs: BTreeMap<&str, f64> = BTreeMap::new();
         for one in given {
             let shape = one.shape.as_deref().unwrap_or_default();
-            let is_own = |says: &&CellSays| {
-                let row = &says.row;
+            let is_own = |profile: &&CellProfile| {
+                let row = &profile.row;
                 row.given == one.cell && row.cell == one.cell && row.shape == shape
             };
             let present = cells.iter().find(is_own);
-            let log = present.map_or(*LEAST_EVIDENCE, |says| {
-                says.row.log_evidence.max(*LEAST_EVIDENCE)
+            let log = present.map_or(*LEAST_EVIDENCE, |profile| {
+                profile.row.log_evidence.max(*LEAST_EVIDENCE)
             });
             logs.insert(&one.cell, log);
             let sums = self.owners.entry(one.cell.clone()).or_default();
             (sums[0], sums[1]) = (sums[0] + log, sums[1] + log * log);
         }
-        for says in cells {
-            let row = &says.row;
+        for profile in cells {
+            let row = &profile.row;
             let key = (row.given.clone(), row.cell.clone(), row.shape.clone());
             let owner = logs
                 .get(row.given.as_str())
@@ -271,7 +271,7 @@ impl GroupSums {
             self.sums
                 .entry(key)
                 .or_insert_with(|| Sum::new(row))
-                .add(says, owner);
+                .add(profile, owner);
         }
     }
 
@@ -321,17 +321,17 @@ pub(super) fn each(
     fleet: &Fleet,
     ledger: &Ledger,
     records: &[Option<RobotRecord>],
-    take: &mut dyn FnMut(&FleetRobot, &[CellSays]),
+    take: &mut dyn FnMut(&FleetRobot, &[CellProfile]),
 ) -> Result<()> {
     let robots: Vec<_> = fleet.roster.0.iter().zip(records).collect();
     for some in robots.chunks(CHUNK) {
-        let tables: Vec<Option<Vec<CellSays>>> = some
+        let tables: Vec<Option<Vec<CellProfile>>> = some
             .par_iter()
             .map(|(_, record)| {
                 let table = |kind| record.as_ref().and_then(|record| record.last(kind));
                 let rows: Option<CellEvidence> = ledger.load(table(CellEvidence::KIND))?;
                 let at: Option<CellAmplitudes> = ledger.load(table(CellAmplitudes::KIND))?;
-                rows.zip(at).map(says).transpose()
+                rows.zip(at).map(profiles).transpose()
             })
             .collect::<Result<_>>()?;
         for ((robot, _), cells) in some.iter().zip(tables) {
@@ -344,7 +344,7 @@ pub(super) fn each(
 }
 
 /// The rows of both tables, which have one order.
-fn says((rows, amplitudes): (CellEvidence, CellAmplitudes)) -> Result<Vec<CellSays>> {
+fn profiles((rows, amplitudes): (CellEvidence, CellAmplitudes)) -> Result<Vec<CellProfile>> {
     let (steps, rest) = amplitudes.0.as_chunks::<STEPS>();
     let is_own = |(row, steps): (&CellEvidenceRow, &[CellAmplitudeRow; STEPS])| {
         let [first, ..] = steps;
@@ -354,10 +354,14 @@ fn says((rows, amplitudes): (CellEvidence, CellAmplitudes)) -> Result<Vec<CellSa
     if !all || !rows.0.iter().zip(steps).all(is_own) {
         return Err(Error::Bug("cell_amplitudes is not of cell_evidence".into()));
     }
-    let cells = rows.0.into_iter().zip(steps).map(|(row, steps)| CellSays {
-        row,
-        at: std::array::from_fn(|k| steps[k].log_evidence),
-    });
+    let cells = rows
+        .0
+        .into_iter()
+        .zip(steps)
+        .map(|(row, steps)| CellProfile {
+            row,
+            at: std::array::from_fn(|k| steps[k].log_evidence),
+        });
     Ok(cells.collect())
 }
 
@@ -370,7 +374,7 @@ fn log_add(a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn row(log: f64) -> CellSays {
+    fn row(log: f64) -> CellProfile {
         let row = CellEvidenceRow {
             cell: "backlash@joint 2".into(),
             effect: "backlash".into(),
@@ -382,7 +386,7 @@ mod tests {
             ..CellEvidenceRow::default()
         };
         let at = [log; STEPS];
-        CellSays { row, at }
+        CellProfile { row, at }
     }
 
     fn odds(logs: &[f64], robots: usize) -> (f64, f64) {
@@ -407,9 +411,9 @@ mod tests {
     fn the_scatter_of_a_difference_is_that_of_its_terms() {
         let mut sums = GroupSums::default();
         let given = |cell: &str, log: f64| {
-            let mut says = row(log);
-            (says.row.given, says.row.cell) = ("a".into(), cell.into());
-            says
+            let mut profile = row(log);
+            (profile.row.given, profile.row.cell) = ("a".into(), cell.into());
+            profile
         };
         // Differences 1, 4 and, where the rival has no row, 5 + 3.3.
         let asked = [Given {
@@ -428,16 +432,16 @@ mod tests {
     }
 
     /// A column whose coefficient is seen to so many standard deviations, one of which is the 5th amplitude.
-    fn seen_to(deviations: f64) -> CellSays {
+    fn seen_to(deviations: f64) -> CellProfile {
         let at: [f64; STEPS] = std::array::from_fn(|k| {
             let signal = (2.0 * (k as f64 - 5.0) * amplitude_step()).exp();
             0.5 * (deviations * deviations * signal / (1.0 + signal) - signal.ln_1p())
         });
-        let mut says = row(0.0);
+        let mut profile = row(0.0);
         let whole: f64 = at.iter().map(|log| log.exp()).sum();
-        says.row.log_evidence = (whole / STEPS as f64).ln();
-        says.at = at;
-        says
+        profile.row.log_evidence = (whole / STEPS as f64).ln();
+        profile.at = at;
+        profile
     }
 
     #[test]
@@ -458,12 +462,12 @@ mod tests {
     fn a_size_that_robots_share_is_where_they_say_most_together() {
         let mut sums = GroupSums::default();
         for deviations in [1.0, 2.0, 3.0, 4.0] {
-            let mut says = seen_to(deviations);
+            let mut profile = seen_to(deviations);
             // The likeliest amplitude of each, as one of mm.
-            let at = says.at;
+            let at = profile.at;
             let best = (0..STEPS).max_by(|a, b| at[*a].total_cmp(&at[*b]));
-            says.row.size = 1e-3 * (best.unwrap_or(0) as f64 * amplitude_step()).exp();
-            sums.add(&[says], &[]);
+            profile.row.size = 1e-3 * (best.unwrap_or(0) as f64 * amplitude_step()).exp();
+            sums.add(&[profile], &[]);
         }
         // By their sum of squares, a^2 = (1 + 4 + 9 + 16) / 4 - 1 standard errors.
         let size = sums.cells("").next().expect("a cell").size(&sums);

@@ -2,7 +2,7 @@
 //! pays; then what single robots show alone.
 
 use super::cause_answers::{self, Answers};
-use super::cause_sums::{CellSays, CellTotal, GroupSums, each};
+use super::cause_sums::{CellProfile, CellTotal, GroupSums, each};
 use super::ledger::RobotRecord;
 use super::round::{GroupColumn, Round};
 use super::{Fleet, Ledger};
@@ -115,11 +115,11 @@ impl CauseSearch {
 }
 
 /// The cell that a robot by itself shows next to those in its model, if its odds alone are strong.
-fn likeliest(cells: &[CellSays]) -> Option<Given> {
-    let odds = |says: &CellSays| says.row.log_evidence + says.row.log_prior;
+fn likeliest(cells: &[CellProfile]) -> Option<Given> {
+    let odds = |profile: &CellProfile| profile.row.log_evidence + profile.row.log_prior;
     let best = cells
         .iter()
-        .filter(|CellSays { row, .. }| {
+        .filter(|CellProfile { row, .. }| {
             row.given.is_empty() && row.shape.is_empty() && row.sigma.is_none()
         })
         .max_by(|a, b| odds(a).total_cmp(&odds(b)))?;
@@ -313,7 +313,7 @@ mod tests {
     use crate::stage::STEPS;
     use crate::table::CellEvidenceRow;
 
-    fn row(present: &str, (cell, log_evidence): (&str, f64)) -> CellSays {
+    fn row(present: &str, (cell, log_evidence): (&str, f64)) -> CellProfile {
         let row = CellEvidenceRow {
             given: present.into(),
             cell: cell.into(),
@@ -326,7 +326,7 @@ mod tests {
             ..CellEvidenceRow::default()
         };
         let at = [log_evidence; STEPS];
-        CellSays { row, at }
+        CellProfile { row, at }
     }
 
     /// Sums of one robot that was asked in the place of a cell.

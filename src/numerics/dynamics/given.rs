@@ -204,7 +204,7 @@ impl TorqueTable<'_, '_> {
         let log_odds = self.odds_of(components, place, kappa);
         let whole = self.whole_answer(component.form, log_odds, found.size * unit, left_out);
         let at = self.at_amplitudes(component.form, state);
-        let whole = whole.at(at, 0.0);
+        let whole = whole.at(at, self.log_count(self.cell_of[&component.form]));
         Some(CellAnswer {
             log: whole.log.max(*LEAST_EVIDENCE),
             sigma: Some(found.sigma * unit),

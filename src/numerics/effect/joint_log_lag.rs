@@ -2,7 +2,7 @@
 //! joints were logged, or, where a controller ends the moves of all joints together, a turn shared out as these moves are; of a moving arm the two clocks are apart: each joint is dq/dt times the same time further on.
 
 use super::form::placed;
-use super::summary::said;
+use super::summary::rounded;
 use super::{
     ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, NumberSpec, OwnMotion, Place,
     Placed, Summary, Survey, Variable, figure, names,
@@ -97,7 +97,7 @@ fn sentence(summary: &Summary) -> String {
             } else {
                 ("late", "after")
             };
-            let ms = said(n.value.abs(), n.sigma, 2);
+            let ms = rounded(n.value.abs(), n.sigma, 2);
             format!(
                 "the tracker's clock is {ms} ms {how} relative to the controller's: points were measured that long {when} the joints \
                  of their rows"
@@ -107,7 +107,7 @@ fn sentence(summary: &Summary) -> String {
         Some(n) if n.unit == "arcsec" => format!(
             "joints were logged before the arm had settled: the joint that moved most had {} arcsec still to come, the others their \
              shares of it",
-            said(n.value, n.sigma, 0)
+            rounded(n.value, n.sigma, 0)
         ),
         Some(n)
             if let Some(joint) = n
@@ -118,12 +118,12 @@ fn sentence(summary: &Summary) -> String {
         {
             format!(
                 "joint {joint} was logged before it had settled: {} % of its last move was still to come",
-                said(n.value * 100.0, n.sigma.map(|sigma| 100.0 * sigma), 2)
+                rounded(n.value * 100.0, n.sigma.map(|sigma| 100.0 * sigma), 2)
             )
         }
         Some(n) if summary.parameters.len() == 1 => format!(
             "joints were logged before the arm had settled: {} % of the last move was still to come",
-            said(n.value * 100.0, n.sigma.map(|sigma| 100.0 * sigma), 2)
+            rounded(n.value * 100.0, n.sigma.map(|sigma| 100.0 * sigma), 2)
         ),
         Some(_) => {
             let shares = summary.parameters.iter().map(|n| n.value * 100.0);

@@ -1,6 +1,6 @@
 //! What a mechanic is told of a finding: words with holes.
 
-use super::summary::{root_of_squares, said};
+use super::summary::{root_of_squares, rounded};
 use super::{
     Basis, Cause, Clock, ParameterEstimate, Summary, Term, Variable, figure, law_shapes, names,
     unknown,
@@ -74,7 +74,7 @@ pub(super) fn hole(
         "unit" => known(first.map(|number| number.unit.to_string())),
         "length" => {
             let (size, sigma) = root_of_squares(numbers);
-            known(first.map(|number| format!("{} {}", said(size, sigma, 3), number.unit)))
+            known(first.map(|number| format!("{} {}", rounded(size, sigma, 3), number.unit)))
         }
         "order" => known(order().map(|order| match order.fract().abs() < 1e-9 {
             true => format!("{order:.0}"),
@@ -133,7 +133,7 @@ pub(super) fn hole(
                 let (scale, decimals) = number.split_once(':')?;
                 let (first, scale) = (first?, scale.parse::<f64>().ok()?);
                 let sigma = first.sigma.map(|sigma| sigma * scale.abs());
-                Some(said(first.value * scale, sigma, decimals.parse().ok()?))
+                Some(rounded(first.value * scale, sigma, decimals.parse().ok()?))
             };
             known(scaled())
         }
@@ -145,7 +145,7 @@ fn amplitude(numbers: &[&ParameterEstimate]) -> String {
     match numbers {
         [a, b, ..] => {
             let (size, sigma) = root_of_squares(&[a, b]);
-            format!("{} {}", said(size, sigma, 0), a.unit)
+            format!("{} {}", rounded(size, sigma, 0), a.unit)
         }
         _ => String::new(),
     }

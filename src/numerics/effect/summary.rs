@@ -33,7 +33,7 @@ pub fn people(unit: Unit) -> (Unit, &'static str) {
 }
 
 /// A number with the digits that its standard deviation tells, where that was estimated; else with its usual decimals.
-pub(super) fn said(value: f64, sigma: Option<f64>, decimals: usize) -> String {
+pub(super) fn rounded(value: f64, sigma: Option<f64>, decimals: usize) -> String {
     match sigma.filter(|sigma| *sigma > 0.0 && sigma.is_finite()) {
         Some(sigma) => measured(value, Some(sigma)),
         None => figure(value, decimals),
@@ -145,7 +145,7 @@ impl<'a> Summary<'a> {
     /// The size of the first number with its unit.
     pub(super) fn size(&self) -> String {
         self.parameters.first().map_or_else(String::new, |n| {
-            format!("{}{}", said(n.value.abs(), n.sigma, 0), unit(n))
+            format!("{}{}", rounded(n.value.abs(), n.sigma, 0), unit(n))
         })
     }
 }

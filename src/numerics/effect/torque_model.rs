@@ -2,7 +2,7 @@
 //! nothing).
 
 use super::form::placed;
-use super::summary::said;
+use super::summary::rounded;
 use super::unknown::described;
 use super::{
     ArmState, BeyondRange, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion,
@@ -358,14 +358,14 @@ fn declared_otherwise(summary: &Summary) -> String {
             let how = if n.value < 0.0 { "less" } else { "more" };
             format!(
                 "the tool weighs {} kg {how} than the robot file and the payload say",
-                said(n.value.abs(), n.sigma, 1)
+                rounded(n.value.abs(), n.sigma, 1)
             )
         }
         Some(n) => {
             let how = if n.value < 0.0 { "lighter" } else { "heavier" };
             format!(
                 "the payload is {} % {how} than declared",
-                said(n.value.abs() * 100.0, n.sigma.map(|sigma| 100.0 * sigma), 1)
+                rounded(n.value.abs() * 100.0, n.sigma.map(|sigma| 100.0 * sigma), 1)
             )
         }
         None => "the payload is not what was declared".to_string(),

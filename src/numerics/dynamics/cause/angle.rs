@@ -53,14 +53,14 @@ pub(crate) static CURRENT_OFFSET: TorqueCause = TorqueCause {
         let constant = format!(
             "the torque of {} reads {} {newtons} too {}, whatever it does",
             form.place,
-            fitted[0].size().said(),
+            fitted[0].size().rounded(),
             if is_little { "little" } else { "much" }
         );
         match fitted.get(1) {
             None => constant,
             Some(cold) => format!(
                 "{constant}; it begins {} {newtons} from that and comes there over {:.1} s",
-                cold.said(),
+                cold.rounded(),
                 form.shape[0]
             ),
         }
@@ -124,9 +124,9 @@ const SPRING: TorqueCause = TorqueCause {
                 "a balancing spring"
             },
             form.place,
-            fitted[0].said(),
+            fitted[0].rounded(),
             unit("Nm/rad"),
-            fitted[1].said(),
+            fitted[1].rounded(),
             unit("Nm")
         )
     },
@@ -200,7 +200,7 @@ pub(super) static BALANCER: TorqueCause = TorqueCause {
         square(values.len()) >= LEAST_WHOLE * LEAST_WHOLE * square(values.len().min(BALANCERS[0]))
     },
     statement: |form, fitted, _| {
-        let size = size_of_two(fitted).said();
+        let size = size_of_two(fitted).rounded();
         // -size sin(q - zero).
         let zero = fitted[0].value.atan2(-fitted[1].value).to_degrees();
         format!(
@@ -274,7 +274,7 @@ pub(super) static RIPPLE: TorqueCause = TorqueCause {
         format!(
             "the torque of {} ripples by {} Nm, {order} times a turn of {}",
             form.place,
-            size_of_two(fitted).said(),
+            size_of_two(fitted).rounded(),
             ["the joint", "its motor"][motor.min(1)]
         )
     },

@@ -39,7 +39,7 @@ pub(crate) static VISCOUS_FRICTION: TorqueCause = TorqueCause {
         format!(
             "{} has viscous friction of {} {}{grows}",
             form.place,
-            fitted[0].said(),
+            fitted[0].rounded(),
             unit("Nm s/rad")
         )
     },
@@ -88,7 +88,7 @@ pub(crate) static COULOMB_FRICTION: TorqueCause = TorqueCause {
         format!(
             "{} has Coulomb friction of {} {}",
             form.place,
-            fitted[0].said(),
+            fitted[0].rounded(),
             unit("Nm")
         )
     },
@@ -109,7 +109,7 @@ pub(super) static ASYMMETRIC: TorqueCause = TorqueCause {
         format!(
             "friction of {} is {} {} greater in its {} direction",
             form.place,
-            fitted[0].size().said(),
+            fitted[0].size().rounded(),
             unit("Nm"),
             if is_negative { "negative" } else { "positive" }
         )
@@ -165,7 +165,7 @@ pub(super) static STRIBECK: TorqueCause = TorqueCause {
         format!(
             "friction of {} is {} {} greater when it begins to move, which falls over {:.3} {}",
             form.place,
-            fitted[0].said(),
+            fitted[0].rounded(),
             unit("Nm"),
             form.shape[0],
             unit("rad/s")
@@ -245,7 +245,7 @@ pub(super) static LOAD: TorqueCause = TorqueCause {
     },
     statement: |form, fitted, unit| {
         let (place, exponent) = (form.place, power_of_load(form));
-        let percent = |share: &FittedNumber| format!("{} %", scaled(share, 100.0).said());
+        let percent = |share: &FittedNumber| format!("{} %", scaled(share, 100.0).rounded());
         let transmitted = match exponent == LINEAR {
             true => "of the torque that it transmits".to_string(),
             false => format!(
@@ -338,9 +338,9 @@ pub(super) static WARMUP: TorqueCause = TorqueCause {
         format!(
             "friction of {} begins {} {} and {} {} higher and falls over {:.1} s",
             form.place,
-            fitted[1].said(),
+            fitted[1].rounded(),
             unit("Nm"),
-            fitted[0].said(),
+            fitted[0].rounded(),
             unit("Nm s/rad"),
             form.shape[0]
         )
@@ -433,8 +433,8 @@ pub(super) static WRIST_COUPLING: TorqueCause = TorqueCause {
             form.place,
             form.with[0] + 1,
             form.shape[0],
-            fitted[1].said(),
-            fitted[0].said()
+            fitted[1].rounded(),
+            fitted[0].rounded()
         )
     },
     ..PLAIN

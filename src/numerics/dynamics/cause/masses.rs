@@ -208,7 +208,7 @@ fn grams(number: FittedNumber, rest: &str) -> String {
             format!("{value:.decimals$} +- {sigma:.decimals$} g{rest}")
         }
         true => format!("{:.0} g{rest}", 1e3 * number.value),
-        false => format!("{} kg{rest}", number.said()),
+        false => format!("{} kg{rest}", number.rounded()),
     }
 }
 
@@ -420,7 +420,7 @@ pub(super) static LINK_CENTRE: TorqueCause = TorqueCause {
         }
         let parts = told.iter().map(|(name, value)| {
             let axis = name.rsplit('_').next().unwrap_or_default();
-            format!("{} mm along {axis}", value.said())
+            format!("{} mm along {axis}", value.rounded())
         });
         format!(
             "the centre of mass of {} is {} from where it is declared; how far it is off elsewhere is not seen",
@@ -456,7 +456,7 @@ pub(super) static LINK_INERTIA: TorqueCause = TorqueCause {
         format!(
             "the inertia of {} is off, by up to {} kg m2",
             form.place,
-            largest.map_or_else(String::new, FittedNumber::said)
+            largest.map_or_else(String::new, FittedNumber::rounded)
         )
     },
     ..PLAIN
@@ -507,7 +507,7 @@ pub(super) static GRAVITY_DIRECTION: TorqueCause = TorqueCause {
         let azimuth = fitted[1].value.atan2(fitted[0].value).to_degrees();
         format!(
             "the base is tilted by {} deg: gravity pulls towards {azimuth:.0} deg of the plane across the declared one",
-            scaled(&tilt(fitted), 1f64.to_degrees()).said()
+            scaled(&tilt(fitted), 1f64.to_degrees()).rounded()
         )
     },
     ..PLAIN
@@ -589,7 +589,7 @@ pub(super) static WRONG_CONSTANT: TorqueCause = TorqueCause {
         let place = form.place;
         let percent = scaled(&fitted[0], 100.0);
         let sign = if percent.value < 0.0 { "" } else { "+" };
-        let percent = format!("{sign}{}", percent.said());
+        let percent = format!("{sign}{}", percent.rounded());
         match form.shape.first() {
             None => format!(
                 "torques of {place} read {percent} % off: its torque constant is not the declared one"

@@ -156,7 +156,7 @@ pub(super) static SPIKES: TorqueCause = TorqueCause {
         format!(
             "each reversal of {} knocks with {} {}, {:.3} s later: lost motion",
             form.place,
-            fitted[0].said(),
+            fitted[0].rounded(),
             unit("Nm"),
             form.shape[0]
         )

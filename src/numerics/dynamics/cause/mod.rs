@@ -287,7 +287,7 @@ const SEEN: f64 = 0.5;
 
 impl FittedNumber {
     /// With the digits that its standard deviation tells.
-    pub(crate) fn said(&self) -> String {
+    pub(crate) fn rounded(&self) -> String {
         measured(self.value, Some(self.sigma))
     }
 
