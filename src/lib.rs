@@ -23,7 +23,7 @@
 //! ```
 //!
 //! # The map
-//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> diagnose`)
+//! Two towers that do not know each other, and one bridge. **Numerics** (`spatial -> robot -> effect -> observation -> estimate -> engine -> diagnose`)
 //! has no files and no frames: the package `calib-numerics` in `src/numerics`, and above it `calib-diagnose`, `calib-dynamics`,
 //! `calib-engine` and `calib-drives` in folders of that. The **twin** (`calib-twin`) does not depend on them. **Columns** (`raw`, `store`)
 //! have no robots. [`table`] is the only bridge between a Parquet row and a Rust value; [`stage`] is the only place where both towers are used;
@@ -51,8 +51,8 @@
 //! | [`compensate`] | commands that bring the real arm to a wanted point: the inverse of the identified model | effect, estimate, robot, spatial |
 //! | [`program`] | programs of controllers (KRL, RAPID), read strictly: rewritten in the numbers of their targets, or as lists of joints | compensate, robot, spatial |
 //! | [`targets`] | tables of targets (text, Parquet) with their joints replaced, planned motions with their torques | compensate, dynamics, raw, robot |
-//! | [`diagnose`] | where recording and simulation differ, which cause explains it | criteria, effect, estimate, observation, robot, spatial |
-//! | [`engine`] | one search for what a model lacks, whatever was recorded | diagnose |
+//! | [`engine`] | one evidence and one search for what a model lacks, whatever was recorded | criteria |
+//! | [`diagnose`] | where recording and simulation differ, which cause explains it | criteria, effect, engine, estimate, observation, robot, spatial |
 //! | [`dynamics`] | torques of the moving arm, and which physics a rigid one lacks | criteria, diagnose, effect, engine, estimate, spatial |
 //! | [`drives`] | robots from MJCF, their drives rolled out along commands, and which physics that simulation lacks | dynamics, engine |
 //! | [`twin`] | the truth maker: recordings by other kinematics than the estimator's | the robot's description only |

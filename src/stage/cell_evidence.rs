@@ -10,7 +10,7 @@ use crate::{
     AskedRows, Context, Diagnose, DiagnoseReads, DiagnoseTorques, DiagnoseTorquesReads, RawFile,
     Stage,
 };
-use calib_diagnose::table::AMPLITUDES;
+use calib_engine::AMPLITUDES;
 use calib_diagnose::{CellAnswer, GivenCell, cell_evidence};
 use calib_numerics::criteria::cells::{LARGEST, SMALLEST};
 use schemars::JsonSchema;

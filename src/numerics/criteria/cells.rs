@@ -117,14 +117,14 @@ criteria! {
     UNLIKELY: f64 = -8.0, "ln of odds", "count: 1 in 3,000", "";
     /// Cells that are asked first when one has joined.
     LIKELY: usize = 240, "cells", "judgement: bounds time; all are asked before the search ends", "";
+    /// Cells of a scan that are put in the model to see which says most there.
+    TRIED: usize = 4, "cells", "judgement: bounds time; a scan is exact but for what it leaves of the others", "";
     /// Share of a component's motion that a cell must be able to make to be asked in its place.
     ALIKE: f64 = 0.2, "share", "judgement: less explains something else", "";
     /// Share of two components' covariances in common above which one is estimated anew when the other joins.
     COUPLED: f64 = 0.01, "share", "judgement: bounds time", "";
     /// How often a step of a shape's number is halved.
     LEVELS: i32 = 5, "levels", "judgement: bounds time", "";
-    /// Exchanges of a search at most.
-    EXCHANGES: usize = 8, "exchanges", "judgement: bounds time", "";
     /// Share of the evidence of a curve that waves may lack before all sizes are taken anew.
     NEARLY: f64 = 0.2, "share", "judgement: sizes and shapes taken anew gain less", "";
     /// Waves that may stand in for a free curve of a joint's own angle.

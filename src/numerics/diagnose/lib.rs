@@ -12,6 +12,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+use calib_engine::linear;
 use calib_foundation::{statistics, units};
 use calib_numerics::{criteria, effect, error, estimate, observation, robot, spatial};
 // Paths are those of the crate `calib`.
@@ -19,7 +20,6 @@ use crate as diagnose;
 
 mod closed_form;
 mod judge;
-mod linear;
 mod misfit;
 mod outside;
 mod regression;

@@ -13,7 +13,7 @@ use super::sliding::unit_of;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueFinding};
 use crate::criteria::cells::{MISLED, RIVAL};
-use crate::diagnose::table::log_sum;
+use calib_engine::log_sum;
 use crate::diagnose::{Evidence, Probabilities, RivalCause};
 use crate::effect::Place;
 use crate::estimate::tail;

@@ -7,7 +7,8 @@ use super::cells::{
 use super::solve::SolvedTorques;
 use crate::criteria::fleet::LEAST_EVIDENCE;
 use crate::criteria::torque::PER_METRE;
-use crate::diagnose::table::{AMPLITUDES, evidence_at, log_sum, log_sums, rms_size};
+use crate::diagnose::table::rms_size;
+use calib_engine::{AMPLITUDES, evidence_at, log_sum, log_sums};
 use crate::diagnose::{CellAnswer, GivenCell};
 use std::collections::BTreeMap;
 

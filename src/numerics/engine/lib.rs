@@ -4,14 +4,20 @@
 //! and fits a set of them with everything that is not linear in it. [`diagnose`] adds, exchanges and drops cells by one price, the evidence,
 //! and says of each cell that stands which others could stand in its place. No cause is known here by its name.
 //!
-//! The formula of the evidence is that of the table of causes (`calib_diagnose`).
+//! The formula of the evidence is one, too: [`evidence`] of columns by their products, whatever they are columns of.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+mod evidence;
+pub mod linear;
 mod rows;
 mod search;
 
+pub use evidence::{
+    AMPLITUDES, EvidenceRows, GroupEvidence, evidence, evidence_at, evidence_between, log_sum,
+    log_sums,
+};
 pub use rows::{Block, Rows, ranked};
 pub use search::{Answer, Options, diagnose, dropped, findings};
 
@@ -183,6 +189,10 @@ pub trait Problem: Sync {
     /// ln of the odds of a member of the set against nothing, to first order; `None` where only a fit without it tells.
     fn odds(&self, _fit: &Self::Fit, _member: usize, _independence: f64) -> Option<f64> {
         None
+    }
+    /// Whether two cells are one for the question what else could stand: both have one name at one place.
+    fn is_same(&self, one: &Accepted<Self::Key>, other: &Accepted<Self::Key>) -> bool {
+        one.cell.cause.name == other.cell.cause.name && one.cell.place == other.cell.place
     }
     /// Whether two cells in their shapes exclude each other: both change the same term of the model.
     fn excludes(&self, _one: &Accepted<Self::Key>, _other: &Accepted<Self::Key>) -> bool {

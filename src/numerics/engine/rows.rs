@@ -1,7 +1,6 @@
 //! Rows around a fit by their products alone: what is needed of them is a few small matrices, however many there are.
 
-use crate::{Accepted, Cell, Scanned};
-use calib_diagnose::table::{EvidenceRows, evidence};
+use crate::{Accepted, Cell, EvidenceRows, Scanned, evidence, log_sum};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// Whitened rows: their residual, and what is free under its tolerance already.
@@ -102,7 +101,7 @@ pub fn ranked<K: Clone>(cells: Vec<CellAnswers<K>>) -> Vec<Scanned<K>> {
             let weighed = |at: usize| shapes[at].0 + cell.shapes[at].log_weight;
             let best = (0..shapes.len()).max_by(|a, b| weighed(*a).total_cmp(&weighed(*b)))?;
             let logs: Vec<f64> = (0..shapes.len()).map(weighed).collect();
-            let log_odds = calib_diagnose::table::log_sum(&logs) + cell.log_prior;
+            let log_odds = log_sum(&logs) + cell.log_prior;
             let numbers = shapes[best].1.clone();
             let accepted = Accepted {
                 cell,

@@ -1,7 +1,6 @@
 //! Add, exchange, drop, until nothing changes; then leave each out once.
 
-use crate::{Accepted, Cell, Finding, Problem, Rival, Scanned};
-use calib_diagnose::table::log_sum;
+use crate::{Accepted, Cell, Finding, Problem, Rival, Scanned, log_sum};
 use rayon::prelude::*;
 
 /// Numbers that decide.
@@ -117,11 +116,7 @@ fn candidates<P: Problem>(
     };
     let mut kept: Vec<Scanned<P::Key>> = Vec::new();
     for one in scanned.into_iter().filter(free) {
-        let cell = &one.accepted.cell;
-        let is_same = |other: &&Scanned<P::Key>| {
-            let other = &other.accepted.cell;
-            other.cause.name == cell.cause.name && other.place == cell.place
-        };
+        let is_same = |other: &&Scanned<P::Key>| problem.is_same(&other.accepted, &one.accepted);
         if one.log_odds > least.max(options.joins) && kept.iter().find(is_same).is_none() {
             kept.push(one);
         }
@@ -362,10 +357,8 @@ fn posterior<P: Problem>(
         let without = problem.fit(&rest, Some(fit), f64::NEG_INFINITY);
         let none = problem.log_evidence(&without, independence);
         let scanned = problem.scan(fit, &stand.around, Some(at));
-        let others = scanned.into_iter().filter(|one| {
-            let cell = &one.accepted.cell;
-            cell.cause.name != own.cause.name || cell.place != own.place
-        });
+        let is_other = |one: &Scanned<P::Key>| !problem.is_same(&one.accepted, accepted);
+        let others = scanned.into_iter().filter(is_other);
         let lost = now - none;
         if lost < options.leaves && until != Until::End && is_whole(&rest) {
             let better = Some(Change {

@@ -4,7 +4,6 @@
 use super::cause_table::CauseTable;
 use super::cell::{CauseCell, FreeShape, Shapes};
 use super::component::{CellColumns, Component};
-use super::evidence::log_sum;
 use super::scan::{CellEvidence, CellScan};
 use super::search::without;
 use super::state::KnownState;
@@ -13,6 +12,7 @@ use crate::diagnose::types::{
     ExplainedCell, ExplainedShare, Located, Probabilities, RivalCause, SpectrumLine,
 };
 use crate::effect::{Basis, Clock, Form, Place, Term, Variable, names};
+use calib_engine::log_sum;
 use std::collections::BTreeMap;
 
 /// One finding of a search.

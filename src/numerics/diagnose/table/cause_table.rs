@@ -13,6 +13,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
+use std::sync::atomic::AtomicU64;
 
 /// The table of cells over the rows of a recording.
 pub(super) struct CauseTable<'f, 'a> {
@@ -27,11 +28,8 @@ pub(super) struct CauseTable<'f, 'a> {
     /// The first of all coarse columns of each cell, and their number.
     pub(crate) first: Vec<usize>,
     pub(super) columns: usize,
-    pub(crate) next: u64,
-    /// Variables with numbers that components follow.
-    pub(crate) numbers: Vec<Variable>,
-    /// Cells that were likely at the last look.
-    pub(crate) likely: Vec<usize>,
+    /// The number of the next component.
+    pub(crate) next: AtomicU64,
     /// Keys of cells that are in the model around which the rows are looked at.
     pub(crate) from_before: Vec<String>,
     /// Cells of effects that the user declares.
@@ -106,9 +104,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             known: ColumnProducts::default(),
             first: Vec::new(),
             columns: 0,
-            next: 0,
-            numbers: Vec::new(),
-            likely: Vec::new(),
+            next: AtomicU64::new(1),
             declared: declared.collect(),
             from_before: Vec::new(),
             multiplied: shown.to_vec(),
@@ -168,8 +164,12 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         siblings.into_iter().flatten().filter_map(known).collect()
     }
 
-    /// Adds cells that may do what products among the components do, each as probable beforehand as that, less some.
-    pub(crate) fn add_siblings(&mut self, components: &[Component], without: &BTreeSet<String>) {
+    /// Adds cells that may do what products among the components do, each as probable beforehand as that, less some; whether there are any.
+    pub(crate) fn add_siblings(
+        &mut self,
+        components: &[Component],
+        without: &BTreeSet<String>,
+    ) -> bool {
         let mut fresh: Vec<(CauseCell, Vec<ShapeGroup>)> = Vec::new();
         for component in components {
             let Some(free) = self.product(component) else {
@@ -193,9 +193,9 @@ impl<'f, 'a> CauseTable<'f, 'a> {
                 }
             }
         }
-        if !fresh.is_empty() {
-            self.extend(fresh);
-        }
+        let any = !fresh.is_empty();
+        self.extend(fresh);
+        any
     }
 
     /// The cell of a key.

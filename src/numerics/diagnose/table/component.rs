@@ -221,10 +221,18 @@ pub(super) struct Component {
     pub(crate) square: Arc<Vec<f64>>,
     /// Rms motion at the tool, m.
     pub(crate) amplitude: f64,
+    /// ln of its evidence over that at its amplitude alone.
+    pub(crate) spread: f64,
     /// Columns whose products with themselves are its part in the covariance: the directions that the rows could show.
     pub(crate) part: Arc<Columns>,
     /// What makes these of its columns.
     pub(crate) mix: Arc<DMatrix<f64>>,
+}
+
+impl PartialEq for Component {
+    fn eq(&self, other: &Self) -> bool {
+        self.id == other.id
+    }
 }
 
 /// Prior variance of a direction, in that of the noise, below which no row shows it.

@@ -1,12 +1,12 @@
 //! The rows as they stand around the present model: what is left without any cell, and the columns of whatever moves it; both weighed, with
 //! geometry projected off.
 
-use super::evidence::EvidenceRows;
 use super::factored::{FactoredColumns, Functions, MotionRows, WeighedDirection, sums, unit};
 use super::noise_shape::NoiseShape;
 use crate::diagnose::round::RoundView;
 use crate::effect::{Basis, Factor, Form, Law, Motion, Variable};
 use crate::linear::{self, Columns, product, project, shown_directions, view};
+use calib_engine::EvidenceRows;
 use faer::{Mat, MatRef};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;

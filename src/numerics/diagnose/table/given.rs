@@ -3,7 +3,6 @@
 use super::cause_table::CauseTable;
 use super::cell::CauseCell;
 use super::component::{CellColumns, Component, SeenGroup, shape_keys};
-use super::evidence::{AMPLITUDES, log_sum, log_sums};
 use super::frame::SearchRows;
 use super::noise_shape::NoiseShape;
 use super::search::without;
@@ -14,6 +13,7 @@ use crate::criteria::cells::{CLOSELY, OPEN, SMALLEST};
 use crate::criteria::fleet::{LEAST_EVIDENCE, WRITTEN};
 use crate::diagnose::round::{EstimatedCause, RoundView};
 use crate::effect::{Basis, Form, Place, Term, names};
+use calib_engine::{AMPLITUDES, log_sum, log_sums};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -292,9 +292,9 @@ impl CauseTable<'_, '_> {
         own: CellAnswer,
     ) -> Option<CellAnswer> {
         let alone = self.component_evidence(component, state);
-        let alone = alone.filter(|(log, _)| *log > own.log);
+        let alone = alone.map(|found| found.log).filter(|log| *log > own.log);
         let own = match alone {
-            Some((log, _)) => {
+            Some(log) => {
                 let block = CellColumns::of_component(component, self.frame);
                 let weight = self.log_weight(component.cell);
                 CellAnswer { log, ..own }.at(self.at_amplitudes(&block, state), weight)

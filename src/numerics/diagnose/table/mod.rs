@@ -9,7 +9,6 @@ mod cause_table;
 mod cell;
 mod coarse;
 mod component;
-mod evidence;
 mod factored;
 mod frame;
 mod generated;
@@ -25,9 +24,6 @@ mod state;
 mod stepped;
 
 pub(crate) use answer::{Answer, FoundCell};
-pub use evidence::{
-    AMPLITUDES, EvidenceRows, GroupEvidence, evidence, evidence_at, log_sum, log_sums,
-};
 pub(crate) use generated::places;
 pub use given::{CellAnswer, GivenCell};
 pub(crate) use given::{answers, given_causes};
@@ -212,13 +208,12 @@ impl Rounds {
         // Joints that yield come first: masses and currents speak of what yields in the model, and large motions are not linear.
         let waits = !has_begun && !components.is_empty() && self.round < *ROUNDS;
         if !waits {
-            components = table.grow(components);
-            components = table.prune(components);
+            components = table.searched(components);
         }
         if !waits && !components.is_empty() {
-            table.add_siblings(&components, &self.empty);
-            components = table.swap(components);
-            components = table.grow(components);
+            if table.add_siblings(&components, &self.empty) {
+                components = table.searched(components);
+            }
             if std::mem::take(&mut self.has_new_pairs) {
                 components = table.or_from_named(components);
             }

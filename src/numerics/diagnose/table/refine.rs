@@ -2,21 +2,22 @@
 
 use super::cause_table::CauseTable;
 use super::cell::{FreeShape, Over, ShapeGroup, Shapes, fields};
+use super::component::Component;
 use super::scan::{CellEvidence, CellScan, Refined};
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, CLOSELY, LEVELS, SEPARATED, STICKS};
 use crate::effect::{Basis, Form, Term, Variable};
+use calib_engine::GroupEvidence;
 use rayon::prelude::*;
-
-/// ln of the evidence of a shape, and its amplitude.
-type ShapeEvidence = (f64, f64);
 
 /// A shape with other numbers, and its forms.
 type Variant<T> = (T, Vec<Form>);
 
 impl CauseTable<'_, '_> {
     /// Gives the best cell, and listed shapes near it, the numbers that say most; none to one that has them.
-    pub(crate) fn refine(&self, scan: &mut CellScan, state: &KnownState, but: Option<usize>) {
+    pub(crate) fn refine(&self, scan: &mut CellScan, state: &KnownState, but: Option<&Component>) {
+        let numbers = followed(state.components.iter().chain(but));
+        let but = but.map(|component| component.cell);
         let prior = |cell: usize| self.log_prior(cell, &state.components);
         let most = scan.best().map_or(0.0, |best| scan.log_odds[best]);
         let best = scan.best();
@@ -41,13 +42,14 @@ impl CauseTable<'_, '_> {
                 || self.declared.contains(cell)
                 || nameless.contains(cell)
                 || self.cells[*cell].is_named() && is_near(scan.log_odds[*cell])
-                || self.is_over_numbers(*cell)
+                || self.is_over_numbers(*cell, &numbers)
         };
         // What is still far below the best after large steps gains nothing by small ones that would matter.
         let least = most - (0.2 * most).max(10.0);
         let closer = |cell: usize| {
             let is_worth = |log: f64| prior(cell) + log > least;
-            let refined = self.refined_while(cell, &scan.closely[&cell], state, &is_worth)?;
+            let refined =
+                self.refined_while(cell, &scan.closely[&cell], state, &numbers, &is_worth)?;
             Some((cell, refined))
         };
         let listed: Vec<usize> = scan.closely.keys().copied().filter(asked).collect();
@@ -97,22 +99,25 @@ impl CauseTable<'_, '_> {
         }
     }
 
-    /// The shape of a cell with its numbers where the evidence is largest, with ln of that and its amplitude; none where it has no numbers.
+    /// The shape of a component's cell with its numbers where the evidence is largest, with ln of that and its amplitude; none where it has no
+    /// numbers.
     pub(crate) fn refined(
         &self,
-        cell: usize,
+        component: &Component,
         found: &CellEvidence,
         state: &KnownState,
     ) -> Option<Refined> {
-        self.refined_while(cell, found, state, &|_| true)
+        let numbers = followed(state.components.iter().chain([component]));
+        self.refined_while(component.cell, found, state, &numbers, &|_| true)
     }
 
-    /// The same; steps become smaller while ln of the evidence is worth it.
+    /// The same beside components that follow variables with such numbers; steps become smaller while ln of the evidence is worth it.
     fn refined_while(
         &self,
         cell: usize,
         found: &CellEvidence,
         state: &KnownState,
+        numbers: &[Variable],
         is_worth: &dyn Fn(f64) -> bool,
     ) -> Option<Refined> {
         let best = self.shape_found(cell, found);
@@ -127,11 +132,12 @@ impl CauseTable<'_, '_> {
         };
         // Nothing to climb from is computed before there is somewhere to climb to.
         let start = || value(&best.forms);
-        let found_as = |forms, (log, amplitude): ShapeEvidence| Refined {
+        let found_as = |forms, found: GroupEvidence| Refined {
             forms,
             shape: None,
-            log,
-            amplitude,
+            log: found.log,
+            amplitude: found.amplitude,
+            spread: found.spread,
         };
         match (&self.cells[cell].shapes, &best.forms[..]) {
             (Shapes::Free(free), _) => {
@@ -146,11 +152,11 @@ impl CauseTable<'_, '_> {
                         .collect::<Vec<_>>()
                 };
                 // The numbers of components first.
-                if has_no_numbers(free, &self.numbers) {
+                if has_no_numbers(free, numbers) {
                     return None;
                 }
                 let (mut first, mut start, mut moved) = (*free, start()?, false);
-                let known = self.numbers.iter().filter(|variable| {
+                let known = numbers.iter().filter(|variable| {
                     free.variable.is_alike(**variable) && **variable != free.variable
                 });
                 let known = known.map(|variable| FreeShape {
@@ -158,7 +164,7 @@ impl CauseTable<'_, '_> {
                     ..*free
                 });
                 for (other, forms) in with_forms(known.collect()) {
-                    if let Some(evidence) = value(&forms).filter(|other| other.0 > start.0) {
+                    if let Some(evidence) = value(&forms).filter(|other| other.log > start.log) {
                         (first, start, moved) = (other, evidence, true);
                     }
                 }
@@ -206,12 +212,12 @@ impl CauseTable<'_, '_> {
     }
 
     /// Whether a cell follows a variable with numbers that a component follows with others.
-    fn is_over_numbers(&self, cell: usize) -> bool {
+    fn is_over_numbers(&self, cell: usize, numbers: &[Variable]) -> bool {
         self.cells[cell].free().is_some_and(|free| {
             let other = |variable: &Variable| {
                 free.variable.is_alike(*variable) && free.variable != *variable
             };
-            self.numbers.iter().any(other)
+            numbers.iter().any(other)
         })
     }
 
@@ -223,6 +229,17 @@ impl CauseTable<'_, '_> {
         };
         slips(free.variable) && !matches!(free.over, Over::Product(other) if !slips(other))
     }
+}
+
+/// Variables that components follow, each with its numbers.
+fn followed<'c>(components: impl Iterator<Item = &'c Component>) -> Vec<Variable> {
+    let mut out = Vec::new();
+    for variable in components.flat_map(|one| one.forms.iter().flat_map(|form| form.variables())) {
+        if !out.contains(&variable) {
+            out.push(variable);
+        }
+    }
+    out
 }
 
 /// The forms of a shape of a group: those that it gives a share; none where the group has fewer shapes with other numbers.
@@ -245,7 +262,7 @@ fn forms_of(group: &ShapeGroup, shape: usize) -> Option<Vec<Form>> {
 /// How a shape is stepped from to better ones near it.
 struct Climb<'c, T> {
     near: &'c dyn Fn(&T, i32) -> Vec<Variant<T>>,
-    value: &'c dyn Fn(&[Form]) -> Option<ShapeEvidence>,
+    value: &'c dyn Fn(&[Form]) -> Option<GroupEvidence>,
     /// What a step costs.
     price: &'c dyn Fn(&T, &T) -> f64,
     is_same: &'c dyn Fn(&T, &T) -> bool,
@@ -256,16 +273,16 @@ struct Climb<'c, T> {
 impl<T: Clone> Climb<'_, T> {
     /// Steps to the best near, in steps that halve, until none is better: the last with ln of its evidence and its amplitude, none if that is
     /// the first.
-    fn from(&self, first: T, start: ShapeEvidence) -> Option<(T, ShapeEvidence)> {
+    fn from(&self, first: T, start: GroupEvidence) -> Option<(T, GroupEvidence)> {
         // A step back, or a half step on towards where a whole one led, has been asked before.
-        let mut known: Vec<(T, Option<ShapeEvidence>)> = vec![(first.clone(), Some(start))];
+        let mut known: Vec<(T, Option<GroupEvidence>)> = vec![(first.clone(), Some(start))];
         let (mut now, mut evidence, mut moved) = (first, start, false);
         for level in 0..*LEVELS {
-            if level > 0 && !(self.is_worth)(evidence.0) {
+            if level > 0 && !(self.is_worth)(evidence.log) {
                 break;
             }
             loop {
-                let mut tried: Vec<(ShapeEvidence, T)> = Vec::new();
+                let mut tried: Vec<(GroupEvidence, T)> = Vec::new();
                 for (other, forms) in (self.near)(&now, level) {
                     let asked = known
                         .iter()
@@ -280,15 +297,16 @@ impl<T: Clone> Climb<'_, T> {
                     };
                     tried.extend(found.map(|found| (found, other)));
                 }
-                let paid = |((log, _), other): &(ShapeEvidence, T)| log - (self.price)(&now, other);
+                let paid =
+                    |(found, other): &(GroupEvidence, T)| found.log - (self.price)(&now, other);
                 let best = tried.into_iter().max_by(|a, b| paid(a).total_cmp(&paid(b)));
                 let Some(next) = best else {
                     break;
                 };
-                if paid(&next) <= evidence.0 + 1e-6 {
+                if paid(&next) <= evidence.log + 1e-6 {
                     break;
                 }
-                let gained = next.0.0 - evidence.0;
+                let gained = next.0.log - evidence.log;
                 (evidence, now, moved) = (next.0, next.1, true);
                 if gained < 0.05 {
                     break;

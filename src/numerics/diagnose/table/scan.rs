@@ -3,15 +3,16 @@
 use super::cause_table::CauseTable;
 use super::cell::{CellShape, FreeShape, ShapeGroup};
 use super::component::{CellColumns, Component, shape_keys};
-use super::evidence::{GroupEvidence, log_sum};
 use super::frame::MultipliedColumns;
 use super::state::KnownState;
 use crate::criteria::cells::{BENDS, FAR_BELOW, JOINS, PAIR, PAIRS, SEPARATED, UNLIKELY};
 use crate::effect::Form;
+use calib_engine::{GroupEvidence, log_sum};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// What a cell says given a state, with its likeliest shape.
 #[derive(Clone)]
@@ -23,6 +24,8 @@ pub(super) struct CellEvidence {
     /// Group and shape.
     pub(crate) shape: (usize, usize),
     pub(crate) amplitude: f64,
+    /// ln of the evidence of that shape over that at this amplitude alone.
+    pub(crate) spread: f64,
     /// What it explains of the squared residual.
     pub(crate) fit: f64,
     /// The shape with its numbers where they say most, with ln of its evidence and its amplitude.
@@ -48,10 +51,13 @@ pub(super) struct Refined {
     /// ln of its evidence.
     pub(crate) log: f64,
     pub(crate) amplitude: f64,
+    /// ln of its evidence over that at its amplitude alone.
+    pub(crate) spread: f64,
 }
 
 /// ln of posterior odds of every cell given a state.
-pub(super) struct CellScan {
+#[derive(Default)]
+pub(crate) struct CellScan {
     /// Minus infinity of cells that are not asked.
     pub(crate) log_odds: Vec<f64>,
     /// Of those that were asked closely.
@@ -66,6 +72,16 @@ impl CellScan {
         let odds = |cell: &usize| self.log_odds[*cell];
         let cells = self.closely.keys().copied();
         cells.max_by(|a, b| odds(a).total_cmp(&odds(b)))
+    }
+
+    /// Cells that were asked closely of at least some odds, the likeliest first.
+    pub(crate) fn likeliest(&self, least: f64) -> Vec<(usize, &CellEvidence)> {
+        let found = self.closely.iter().map(|(cell, found)| (*cell, found));
+        let mut found: Vec<_> = found
+            .filter(|(cell, _)| self.log_odds[*cell] >= least)
+            .collect();
+        found.sort_by(|a, b| self.log_odds[b.0].total_cmp(&self.log_odds[a.0]));
+        found
     }
 
     /// With the cells that another scan of the same state asked closely.
@@ -111,6 +127,7 @@ impl CauseTable<'_, '_> {
             bent: log_sum(&bent.map(|one| one.2.log).collect::<Vec<_>>()),
             shape: (best.0, best.1),
             amplitude: best.2.amplitude,
+            spread: best.2.spread,
             fit: best.2.fit,
             refined: None,
         })
@@ -243,13 +260,13 @@ impl CauseTable<'_, '_> {
     ) -> CellScan {
         let mut scan = self.ranked(cells, state, most, also);
         // A component has its numbers.
-        self.refine(&mut scan, state, Some(component.cell));
+        self.refine(&mut scan, state, Some(component));
         if let Some(found) = scan.closely.get_mut(&component.cell)
-            && let Some((log, _)) = self.component_evidence(component, state)
-            && log > found.log
+            && let Some(own) = self.component_evidence(component, state)
+            && own.log > found.log
         {
-            scan.log_odds[component.cell] += log - found.log;
-            found.log = log;
+            scan.log_odds[component.cell] += own.log - found.log;
+            found.log = own.log;
         }
         let siblings = self.siblings(component);
         if !siblings.is_empty() {
@@ -287,12 +304,13 @@ impl CauseTable<'_, '_> {
             positive: component.positive,
             largest: component.largest,
         };
-        let (log, amplitude) = self.shape_evidence(group, state, &state.columns(self.frame))?;
+        let found = self.shape_evidence(group, state, &state.columns(self.frame))?;
         Some(Refined {
             forms,
             shape: Some(component.shape.clone()),
-            log,
-            amplitude,
+            log: found.log,
+            amplitude: found.amplitude,
+            spread: found.spread,
         })
     }
 
@@ -322,24 +340,21 @@ impl CauseTable<'_, '_> {
     }
 
     /// The component that a cell is in a scan.
-    pub(crate) fn component(&mut self, cell: usize, found: &CellEvidence) -> Component {
+    pub(crate) fn component(&self, cell: usize, found: &CellEvidence) -> Component {
         let mut component = self.as_found(cell, found);
         let Some(refined) = found.refined.clone() else {
             return self.with_part(component);
         };
-        let variables = refined.forms.iter().flat_map(|form| form.variables());
-        let new = variables.filter(|variable| !self.numbers.contains(variable));
-        self.numbers.extend(new.collect::<Vec<_>>());
         component.amplitude = refined.amplitude;
+        component.spread = refined.spread;
         component.forms = refined.forms;
         component.shape = refined.shape.unwrap_or(component.shape);
         self.component_of(&component, cell)
     }
 
     /// A component with its part in the covariance.
-    pub(crate) fn with_part(&mut self, component: Component) -> Component {
-        self.next += 1;
-        component.with_part(self.next)
+    pub(crate) fn with_part(&self, component: Component) -> Component {
+        component.with_part(self.next.fetch_add(1, Ordering::Relaxed))
     }
 
     /// The shape of a cell with the numbers of its listed shape, alone in its group, less the forms that it leaves out.
@@ -382,6 +397,7 @@ impl CauseTable<'_, '_> {
             values: columns.values,
             square: Arc::new(columns.square),
             amplitude: found.amplitude,
+            spread: found.spread,
             part: Arc::new(DMatrix::default().into()),
             mix: Arc::default(),
         }
@@ -400,7 +416,7 @@ impl CauseTable<'_, '_> {
     }
 
     /// A component of given forms, e.g. of the model before.
-    pub(crate) fn component_of(&mut self, before: &Component, cell: usize) -> Component {
+    pub(crate) fn component_of(&self, before: &Component, cell: usize) -> Component {
         let forms = before.forms.clone();
         self.with_part(Component {
             cell,
@@ -408,12 +424,12 @@ impl CauseTable<'_, '_> {
         })
     }
 
-    /// ln of the evidence of a component's shape with its weight given a state, and its amplitude.
+    /// The evidence of a component's shape with its weight given a state.
     pub(crate) fn component_evidence(
         &self,
         component: &Component,
         state: &KnownState,
-    ) -> Option<(f64, f64)> {
+    ) -> Option<GroupEvidence> {
         let all = state.components.iter().chain([component]);
         self.parts.know(all, self.frame);
         state.component_evidence(component, &self.parts)
@@ -426,7 +442,7 @@ impl CauseTable<'_, '_> {
         group: ShapeGroup,
         state: &KnownState,
         columns: &MultipliedColumns,
-    ) -> Option<(f64, f64)> {
+    ) -> Option<GroupEvidence> {
         let block = CellColumns::of(vec![group], self.frame);
         let shape = &block.groups[0].group.shapes[0];
         if block.count() != shape.shares.len() {
@@ -434,7 +450,7 @@ impl CauseTable<'_, '_> {
         }
         let across = self.across_once(&block, state, columns);
         let (.., found) = state.shapes(&block, &across, 0).pop()?;
-        Some((found.log, found.amplitude))
+        Some(found)
     }
 }
 

@@ -1,40 +1,245 @@
-//! The search for the cells that the rows show: forward, exchange, drop, each by the evidence of a cell given all others.
+//! The table of causes as a problem of the one search (`calib_engine`): what stands are components, each by its part in the covariance of the
+//! rows, so that a scan says exactly what any other cell would say beside them, and nothing but a chosen one is estimated anew.
 
 use super::cause_table::CauseTable;
 use super::cell::{CellShape, FreeShape, Over};
 use super::component::Component;
-use super::evidence::AMPLITUDES;
+use super::scan::{CellEvidence, CellScan};
 use super::state::KnownState;
 use crate::criteria::cells::{
-    ALIKE, BENDS, CLOSELY, COMPONENTS, COUPLED, EXCHANGES, FAR_BELOW, JOINS, LEAVES, LIKELY,
-    NEARLY, NU, SECOND_ORDER, SWAPS, TRACE, WAVES,
+    ALIKE, BENDS, CLOSELY, COMPONENTS, COUPLED, JOINS, LEAVES, LIKELY, NEARLY, NU, RIVAL,
+    SECOND_ORDER, SWAPS, TRACE, TRIED, WAVES,
 };
 use crate::effect::{Form, Variable, names};
-use std::collections::BTreeSet;
+use calib_engine::{AMPLITUDES, Accepted, Cause, Cell, GroupEvidence, Options, Problem, Scanned};
 
-impl CauseTable<'_, '_> {
-    /// Adds components while they pay.
-    pub(crate) fn add(&mut self, mut components: Vec<Component>) -> Vec<Component> {
-        while let Some(best) = self.best(&components) {
-            components.push(best);
-            components = self.with_newest(components);
+/// Components with the noise that fits them.
+#[derive(Clone)]
+pub(crate) struct StandingComponents {
+    pub(crate) components: Vec<Component>,
+    /// Standard deviation of the noise over what is stated.
+    kappa: f64,
+    /// Those that came or went since sizes and shapes of the others were estimated.
+    changed: Vec<Component>,
+}
+
+fn options() -> Options {
+    Options {
+        joins: *JOINS,
+        leaves: *LEAVES,
+        exchanges: *SWAPS,
+        tried: *TRIED,
+        exchanged: *COMPONENTS,
+        regroups: false,
+        most: *COMPONENTS,
+        told: *RIVAL,
+    }
+}
+
+impl Problem for CauseTable<'_, '_> {
+    type Key = Component;
+    type Fit = StandingComponents;
+    type Around = CellScan;
+
+    /// What was unlikely before is asked again when the likely cells are used up.
+    fn around(&self, fit: &StandingComponents, before: Option<&CellScan>) -> CellScan {
+        let state = self.state(&fit.components, Some(fit.kappa));
+        let numbers: usize = fit.components.iter().map(|one| one.part.ncols()).sum();
+        // So many numbers describe rows and explain nothing.
+        if 3.0 * numbers as f64 > state.rows.freedom {
+            return CellScan::default();
         }
-        components
+        let likely = before.map(|before| before.order.iter().copied().take(*LIKELY));
+        let likely =
+            likely.map(|cells| self.scan_some(&cells.collect::<Vec<_>>(), &state, *CLOSELY, &[]));
+        let joins = |scan: &CellScan| {
+            scan.best()
+                .is_some_and(|best| scan.log_odds[best] >= price(fit.kappa))
+        };
+        let mut scan = likely
+            .filter(joins)
+            .unwrap_or_else(|| self.scan(&state, *CLOSELY, &[]));
+        self.separate(&mut scan, &state);
+        scan
     }
 
-    /// Drops components that no longer pay.
-    pub(crate) fn prune(&mut self, mut components: Vec<Component>) -> Vec<Component> {
-        while !components.is_empty() {
-            let noise = self.noise(&components);
-            let odds =
-                (0..components.len()).map(|place| (place, self.odds(&components, place, noise)));
-            match odds.min_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((place, odds)) if odds <= *LEAVES => _ = components.remove(place),
-                _ => break,
-            }
-            components = self.anew(components);
+    /// What is smaller than the second order of what this round has found already waits for the next round, which is around a model that has
+    /// that in it.
+    fn scan(
+        &self,
+        fit: &StandingComponents,
+        around: &CellScan,
+        out: Option<usize>,
+    ) -> Vec<Scanned<Component>> {
+        if let Some(out) = out {
+            return self.instead(fit, out);
         }
-        components
+        let found = around.likeliest(price(fit.kappa));
+        let is_new = |one: &&Component| !self.from_before.contains(&self.cells[one.cell].key);
+        let new = fit.components.iter().filter(is_new);
+        let moved: f64 = new.map(|component| component.amplitude.powi(2)).sum();
+        match found.first() {
+            Some((_, first)) if first.amplitude >= *SECOND_ORDER * moved => {
+                self.scanned(found, around)
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    fn fit(
+        &self,
+        set: &[Accepted<Component>],
+        before: Option<&StandingComponents>,
+        _least: f64,
+    ) -> StandingComponents {
+        let components = set.iter().map(|one| one.cell.key.clone()).collect();
+        let (components, kappa) = self.possible(components);
+        let changed = before.map_or_else(Vec::new, |before| {
+            let came = components
+                .iter()
+                .filter(|one| !before.components.contains(one));
+            let went = before
+                .components
+                .iter()
+                .filter(|one| !components.contains(one));
+            before
+                .changed
+                .iter()
+                .chain(came)
+                .chain(went)
+                .cloned()
+                .collect()
+        });
+        StandingComponents {
+            components,
+            kappa,
+            changed,
+        }
+    }
+
+    /// Components that do in part what one does that came or went are estimated anew.
+    fn settled(&self, fit: &StandingComponents) -> StandingComponents {
+        let components = fit.components.clone();
+        self.parts
+            .know(components.iter().chain(&fit.changed), self.frame);
+        let is_coupled = |one: &Component| {
+            let mut changed = fit.changed.iter();
+            changed.any(|other| one == other || self.parts.overlap(one, other) > *COUPLED)
+        };
+        let some: Vec<usize> = (0..components.len())
+            .filter(|i| is_coupled(&components[*i]))
+            .collect();
+        let (components, kappa) = self.possible(self.backfit_some(components, &some, 1));
+        StandingComponents {
+            components,
+            kappa,
+            changed: Vec::new(),
+        }
+    }
+
+    fn set(&self, fit: &StandingComponents) -> Vec<Accepted<Component>> {
+        let accepted = |one: &Component| self.accepted(one.clone());
+        fit.components.iter().map(accepted).collect()
+    }
+
+    /// A noise of twice the standard deviation makes four rows worth one.
+    fn independence(&self, fit: &StandingComponents) -> f64 {
+        fit.kappa.powi(-2)
+    }
+
+    fn log_evidence(&self, fit: &StandingComponents, independence: f64) -> f64 {
+        self.total(&fit.components, 1.0 / independence.sqrt())
+    }
+
+    fn odds(&self, fit: &StandingComponents, member: usize, independence: f64) -> Option<f64> {
+        let kappa = 1.0 / independence.sqrt();
+        let state = self.state(&without(&fit.components, &[member]), Some(kappa));
+        let component = &fit.components[member];
+        let found = self.component_evidence(component, &state)?;
+        Some(self.log_prior(component.cell, &state.components) + found.log)
+    }
+
+    /// Two components of one name and place may differ in motion and variable.
+    fn is_same(&self, one: &Accepted<Component>, other: &Accepted<Component>) -> bool {
+        one.cell.key.cell == other.cell.key.cell
+    }
+}
+
+/// ln of the odds above which a cell joins: a misjudged noise makes everything seem likely.
+fn price(kappa: f64) -> f64 {
+    *JOINS * (1.0 + 2.0 * kappa.clamp(1.0, 4.0).ln())
+}
+
+impl CauseTable<'_, '_> {
+    /// The likeliest components, from some on.
+    pub(crate) fn searched(&self, from: Vec<Component>) -> Vec<Component> {
+        let from: Vec<_> = from.into_iter().map(|one| self.accepted(one)).collect();
+        let found = calib_engine::diagnose(self, &from, &options(), |_| ());
+        found.after.components
+    }
+
+    fn accepted(&self, component: Component) -> Accepted<Component> {
+        let cell = &self.cells[component.cell];
+        Accepted {
+            cell: Cell {
+                cause: Cause::named(cell.name),
+                place: cell.place.to_string(),
+                log_prior: cell.log_prior,
+                shapes: Vec::new(),
+                needs: Vec::new(),
+                key: component,
+            },
+            shape: 0,
+            numbers: Vec::new(),
+        }
+    }
+
+    /// Cells of a scan as components, as many as are tried.
+    fn scanned(
+        &self,
+        found: Vec<(usize, &CellEvidence)>,
+        scan: &CellScan,
+    ) -> Vec<Scanned<Component>> {
+        let scanned = |(cell, found): (usize, &CellEvidence)| Scanned {
+            accepted: self.accepted(self.component(cell, found)),
+            log_odds: scan.log_odds[cell],
+        };
+        found.into_iter().take(*TRIED).map(scanned).collect()
+    }
+
+    /// Cells that say more than a component in its place.
+    fn instead(&self, fit: &StandingComponents, out: usize) -> Vec<Scanned<Component>> {
+        let component = &fit.components[out];
+        let state = self.state(&without(&fit.components, &[out]), Some(fit.kappa));
+        let alike = self.alike(component, 24);
+        let near: Vec<usize> = std::iter::once(component.cell)
+            .chain(self.near(component))
+            .chain(self.over_its_variable(component, &state))
+            .collect();
+        let scan = self.scan_instead(component, &alike, &state, 5, &near);
+        let prior = self.log_prior(component.cell, &state.components);
+        let stays = prior + self.log_evidence(component, &state);
+        let mut found = scan.likeliest(stays + *SWAPS);
+        found.retain(|(cell, _)| *cell != component.cell);
+        self.scanned(found, &scan)
+    }
+
+    /// Components without those whose one coefficient would have a size that it cannot have, with the noise that fits them.
+    fn possible(&self, mut components: Vec<Component>) -> (Vec<Component>, f64) {
+        loop {
+            let kappa = self.noise(&components);
+            let cannot_be = |place: &usize| {
+                let state = || self.state(&without(&components, &[*place]), Some(kappa));
+                components[*place].square.len() == 1
+                    && self
+                        .component_evidence(&components[*place], &state())
+                        .is_none()
+            };
+            match (0..components.len()).find(cannot_be) {
+                Some(place) => _ = components.remove(place),
+                None => return (components, kappa),
+            }
+        }
     }
 
     /// The standard deviation of the noise given some components, over what is stated.
@@ -42,66 +247,14 @@ impl CauseTable<'_, '_> {
         self.state(components, None).kappa
     }
 
-    /// ln of the odds of a component given all others, at a noise.
-    fn odds(&self, components: &[Component], i: usize, kappa: f64) -> f64 {
-        let state = self.state(&without(components, &[i]), Some(kappa));
-        let prior = self.log_prior(components[i].cell, &state.components);
-        prior + self.log_evidence(&components[i], &state)
-    }
-
-    /// What pays most given some components, if anything does. What is smaller than the second order of what this round has found already waits for the next round, which is around a model that has
-    /// that in it.
-    fn best(&mut self, components: &[Component]) -> Option<Component> {
-        let state = self.state(components, None);
-        let numbers: usize = components.iter().map(|one| one.part.ncols()).sum();
-        // So many numbers describe rows and explain nothing.
-        if components.len() >= *COMPONENTS || 3.0 * numbers as f64 > state.rows.freedom {
-            return None;
-        }
-        let mut scan = self.scan_some(&self.likely, &state, *CLOSELY, &[]);
-        // A misjudged noise makes everything seem likely.
-        let price = *JOINS * (1.0 + 2.0 * state.kappa.clamp(1.0, 4.0).ln());
-        if self.likely.len() < self.cells.len()
-            && scan.best().is_none_or(|best| scan.log_odds[best] < price)
-        {
-            scan = self.scan(&state, *CLOSELY, &[]);
-        }
-        // What was unlikely before is asked again when the likely ones are used up.
-        self.likely = scan.order.iter().copied().take(*LIKELY).collect();
-        self.separate(&mut scan, &state);
-        let best = scan.best().filter(|best| scan.log_odds[*best] >= price)?;
-        let found = &scan.closely[&best];
-        let new = components
-            .iter()
-            .filter(|component| !self.from_before.contains(&self.cells[component.cell].key));
-        let moved: f64 = new.map(|component| component.amplitude.powi(2)).sum();
-        (found.amplitude >= *SECOND_ORDER * moved).then(|| self.component(best, found))
-    }
-
-    /// The newest component and those that do in part what it does.
-    fn with_newest(&mut self, components: Vec<Component>) -> Vec<Component> {
-        let Some(newest) = components.last() else {
-            return components;
-        };
-        self.parts.know(components.iter(), self.frame);
-        let coupled = |i: &usize| self.parts.overlap(&components[*i], newest) > *COUPLED;
-        let some: Vec<usize> = (0..components.len()).filter(coupled).collect();
-        self.backfit_some(components, &some, 1)
-    }
-
-    /// All components anew.
-    fn anew(&mut self, components: Vec<Component>) -> Vec<Component> {
-        self.backfit(components, 2)
-    }
-
     /// Every component anew given all others: shape and amplitude.
-    pub(crate) fn backfit(&mut self, components: Vec<Component>, rounds: usize) -> Vec<Component> {
+    pub(crate) fn backfit(&self, components: Vec<Component>, rounds: usize) -> Vec<Component> {
         let all = (0..components.len()).collect::<Vec<_>>();
         self.backfit_some(components, &all, rounds)
     }
 
     fn backfit_some(
-        &mut self,
+        &self,
         mut components: Vec<Component>,
         some: &[usize],
         rounds: usize,
@@ -115,7 +268,7 @@ impl CauseTable<'_, '_> {
                     continue;
                 };
                 let before = (components[i].amplitude, components[i].shape.shares.clone());
-                components[i].amplitude = alone.1;
+                (components[i].amplitude, components[i].spread) = (alone.amplitude, alone.spread);
                 let Some(mut grid) = self.closely(components[i].cell, &state) else {
                     continue;
                 };
@@ -127,7 +280,7 @@ impl CauseTable<'_, '_> {
                     components[i].shape = shape.clone();
                     components[i].positive = found.positive;
                     components[i].largest = found.largest;
-                    components[i].amplitude = grid.amplitude;
+                    (components[i].amplitude, components[i].spread) = (grid.amplitude, grid.spread);
                 }
                 if before != (components[i].amplitude, components[i].shape.shares.clone()) {
                     components[i] = self.with_part(components[i].clone());
@@ -141,11 +294,11 @@ impl CauseTable<'_, '_> {
                     continue;
                 };
                 // A shape of further numbers stays on the terms on which it came.
-                let paid = |(log, _): (f64, f64), shape: &CellShape| {
-                    log - if shape.is_bent { *BENDS } else { 0.0 }
+                let paid = |found: GroupEvidence, shape: &CellShape| {
+                    found.log - if shape.is_bent { *BENDS } else { 0.0 }
                 };
                 if paid(other, &shape) > paid(alone, &components[i].shape) + *SWAPS {
-                    grid.refined = self.refined(components[i].cell, &grid, &state);
+                    grid.refined = self.refined(&components[i], &grid, &state);
                     components[i] = self.component(components[i].cell, &grid);
                     changed = true;
                 }
@@ -159,7 +312,7 @@ impl CauseTable<'_, '_> {
 
     /// Where the strongest cell is one of loads, every joint that yields to its own: one link that bends may look better than any one joint, and
     /// worse than all of them. Nothing else.
-    pub(crate) fn start(&mut self) -> Vec<Component> {
+    pub(crate) fn start(&self) -> Vec<Component> {
         let state = self.state(&[], None);
         let scan = self.scan(&state, *CLOSELY, &[]);
         let loads = |form: &Form| {
@@ -187,108 +340,25 @@ impl CauseTable<'_, '_> {
         self.backfit(components, 2)
     }
 
-    /// Adds cells while they pay, then takes all anew.
-    pub(crate) fn grow(&mut self, components: Vec<Component>) -> Vec<Component> {
-        self.likely = (0..self.cells.len()).collect();
-        let before = components.len();
-        let components = self.add(components);
-        if components.len() == before {
-            return components;
-        }
-        let components = self.anew(components);
-        self.prune(components)
-    }
-
     /// ln of the evidence of a component's cell, its refined shape among the others.
     pub(crate) fn log_evidence(&self, component: &Component, state: &KnownState) -> f64 {
         let grid = self.closely(component.cell, state);
         let grid = grid.map_or(f64::NEG_INFINITY, |found| found.log);
         self.component_evidence(component, state)
-            .map_or(grid, |(log, _)| grid.max(log))
-    }
-
-    /// Exchanges components for cells that say more in their place.
-    pub(crate) fn swap(&mut self, mut components: Vec<Component>) -> Vec<Component> {
-        let key = |components: &[Component]| {
-            let mut cells: Vec<usize> = components.iter().map(|component| component.cell).collect();
-            cells.sort_unstable();
-            cells
-        };
-        let mut seen = BTreeSet::from([key(&components)]);
-        // Cells in whose stead every other was far less probable: after an exchange of what they have nothing in common with they are not asked
-        // again.
-        let mut firm = BTreeSet::new();
-        'rounds: for _ in 0..*EXCHANGES {
-            let kappa = self.noise(&components);
-            let mut order: Vec<usize> = (0..components.len()).collect();
-            let size = |i: &usize| components[*i].amplitude;
-            order.sort_by(|a, b| size(a).total_cmp(&size(b)));
-            for i in order {
-                let cell = components[i].cell;
-                if firm.contains(&cell) {
-                    continue;
-                }
-                let state = self.state(&without(&components, &[i]), Some(kappa));
-                let alike = self.alike(&components[i], 24);
-                let near: Vec<usize> = std::iter::once(cell)
-                    .chain(self.near(&components[i]))
-                    .chain(self.over_its_variable(&components[i], &state))
-                    .collect();
-                let scan = self.scan_instead(&components[i], &alike, &state, 5, &near);
-                let Some(best) = scan.best() else { continue };
-                let prior = self.log_prior(cell, &state.components);
-                let stays = prior + self.log_evidence(&components[i], &state);
-                if best == cell || scan.log_odds[best] <= stays + *SWAPS {
-                    let others = scan.closely.keys().filter(|other| **other != cell);
-                    let most = others.map(|other| scan.log_odds[*other]);
-                    if most.fold(f64::NEG_INFINITY, f64::max) < stays - *FAR_BELOW {
-                        firm.insert(cell);
-                    }
-                    continue;
-                }
-                let mut next = state.components;
-                next.push(self.component(best, &scan.closely[&best]));
-                let next = self.backfit(next, 1);
-                if seen.insert(key(&next)) {
-                    self.loosen(&mut firm, &next, &components[i]);
-                    components = next;
-                    continue 'rounds;
-                }
-            }
-            break;
-        }
-        self.prune(components)
-    }
-
-    /// Components that do in part what one does that is gone, or what the newest does, are asked again.
-    fn loosen(&self, firm: &mut BTreeSet<usize>, components: &[Component], gone: &Component) {
-        let Some((newest, others)) = components.split_last() else {
-            return;
-        };
-        self.parts.know(components.iter().chain([gone]), self.frame);
-        for other in others {
-            let coupled = |one: &Component| self.parts.overlap(other, one) > *COUPLED;
-            if coupled(gone) || coupled(newest) {
-                firm.remove(&other.cell);
-            }
-        }
+            .map_or(grid, |found| grid.max(found.log))
     }
 
     /// Components, or those that a search from the ones with a name finds, whichever are the more probable: what was taken up before another
     /// cell was in the table is in the way of it.
-    pub(crate) fn or_from_named(&mut self, components: Vec<Component>) -> Vec<Component> {
+    pub(crate) fn or_from_named(&self, components: Vec<Component>) -> Vec<Component> {
         let named = self.named(&components);
         if named.len() == components.len() {
             return components;
         }
-        let mut others = self.anew(named);
-        others = self.grow(others);
-        others = self.swap(others);
-        others = self.grow(others);
-        if self.is_better(&others, &components) {
-            others
-        } else {
-            components
+        let others = self.searched(self.backfit(named, 2));
+        match self.is_better(&others, &components) {
+            true => others,
+            false => components,
         }
     }
 
@@ -310,14 +380,19 @@ impl CauseTable<'_, '_> {
         let mut prior = 0.0;
         for (i, component) in components.iter().enumerate() {
             prior += self.log_prior(component.cell, &components[..i]);
-            prior += component.shape.log_weight - (AMPLITUDES as f64).ln();
+            prior += component.shape.log_weight + component.spread - (AMPLITUDES as f64).ln();
         }
-        let half = 0.5 * (state.rows.freedom + *NU);
-        prior - state.log_determinant() - half * (*NU + state.rows.square).ln()
+        let (freedom, left) = (self.frame.rows().freedom, state.rows.square);
+        // Rows that leave less than the least noise do not make it smaller.
+        let of_left = match left > freedom {
+            true => 0.5 * (freedom + *NU) * ((left + *NU) / (freedom + *NU)).ln(),
+            false => 0.5 * (left - freedom),
+        };
+        prior - state.log_determinant() - of_left
     }
 
     /// A component without a name that a few causes of the list replace is those: two waves of a gear look like one curve.
-    pub(crate) fn by_several(&mut self, mut components: Vec<Component>) -> Vec<Component> {
+    pub(crate) fn by_several(&self, mut components: Vec<Component>) -> Vec<Component> {
         let unnamed: Vec<u64> = components
             .iter()
             .filter(|component| !self.cells[component.cell].is_named())

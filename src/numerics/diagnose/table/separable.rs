@@ -7,11 +7,11 @@ use super::cell::{
     support, with_mean,
 };
 use super::component::CellColumns;
-use super::evidence::GroupEvidence;
 use super::scan::{CellEvidence, Refined};
 use super::state::KnownState;
 use crate::criteria::cells::{JUMPING, LENGTHS, NU, TURNED, TURNS};
 use crate::effect::{Basis, Law, Motion};
+use calib_engine::GroupEvidence;
 use nalgebra::{DMatrix, DVector};
 
 type Weights = [f64; Basis::CURVE];
@@ -191,6 +191,7 @@ impl CauseTable<'_, '_> {
                 shape: Some(block.groups[0].group.shapes[shape].clone()),
                 log: evidence.log,
                 amplitude: evidence.amplitude,
+                spread: evidence.spread,
             },
             weights,
             cost: evidence.log - cost - gain,

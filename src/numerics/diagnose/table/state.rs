@@ -4,14 +4,14 @@
 //! component is left out, or another one put in, without a pass over the rows.
 
 use super::component::{CellColumns, Component, PartProducts, SeenGroup};
-use super::evidence::{
-    AMPLITUDES, EvidenceRows, GroupEvidence, evidence_at, evidence_between, log_sums,
-};
 use super::factored::unit;
 use super::frame::{MultipliedColumns, SearchRows};
 use crate::criteria::cells::{NU, UNEXPLAINED};
 use crate::effect::Form;
 use crate::linear::{dot, product};
+use calib_engine::{
+    AMPLITUDES, EvidenceRows, GroupEvidence, evidence, evidence_at, evidence_between, log_sums,
+};
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
@@ -322,13 +322,13 @@ impl KnownState {
         most
     }
 
-    /// ln of the evidence of a component in its shape with the weight of that, and its amplitude, from products of parts alone; nothing where
+    /// The evidence of a component in its shape with the weight of that, from products of parts alone; nothing where
     /// its one coefficient would have a size that it cannot have.
     pub(super) fn component_evidence(
         &self,
         component: &Component,
         products: &PartProducts,
-    ) -> Option<(f64, f64)> {
+    ) -> Option<GroupEvidence> {
         let (gram, gradient, across) = products.beside(component, &self.components)?;
         let (gram, gradient) = self.see((&gram, &gradient), &self.solved(across), 0);
         if let [square] = component.square[..] {
@@ -341,8 +341,9 @@ impl KnownState {
         }
         // Its part has the prior variance of its amplitude.
         let shares = vec![component.amplitude.powi(-2); gradient.len()];
-        let found = evidence_between(&gram, &gradient, &shares, self.rows, [0.0, f64::INFINITY]);
-        Some((found.log + component.shape.log_weight, found.amplitude))
+        let mut found = evidence(&gram, &gradient, &shares, self.rows);
+        found.log += component.shape.log_weight;
+        Some(found)
     }
 
     /// What each shape of a block says, by its group and its place in that: its evidence with its weight; nothing of a shape whose coefficient

@@ -4,11 +4,11 @@
 use super::cause_table::CauseTable;
 use super::cell::{CellShape, FreeShape, ShapeGroup, fields, has_few, line_and_curve, support};
 use super::component::CellColumns;
-use super::evidence::{EvidenceRows, GroupEvidence, evidence};
 use super::scan::{CellEvidence, Refined};
 use super::state::KnownState;
 use crate::criteria::cells::{FINELY, LENGTHS, LEVELS, NU, THRESHOLDS};
 use crate::effect::{Basis, Form, Law, Term, Variable};
+use calib_engine::{EvidenceRows, GroupEvidence, evidence};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -154,6 +154,7 @@ impl CauseTable<'_, '_> {
             shape: Some(CellShape::new(shares, log_weight)),
             log: best.log,
             amplitude: best.amplitude,
+            spread: best.spread,
         })
     }
 }

@@ -5,8 +5,8 @@
 //! ln E(a) = -1/2 sum_k ln(1 + a^2 L_k) - (n + nu)/2 ln[1 - sum_k z_k^2 a^2 / (1 + a^2 L_k) / (nu + r'r)]: the scale of the noise is
 //! integrated (inverse gamma about its statement with nu degrees of freedom), the amplitude a over a logarithmic grid.
 
-use crate::criteria::cells::{EXACT, LARGEST, NU, SMALLEST};
 use crate::linear::dot;
+use calib_numerics::criteria::cells::{EXACT, LARGEST, NU, SMALLEST};
 use nalgebra::{DMatrix, DVector};
 use std::sync::LazyLock;
 
@@ -29,15 +29,18 @@ pub struct GroupEvidence {
     pub log: f64,
     /// The likeliest amplitude, rms motion at the tool, m.
     pub amplitude: f64,
+    /// ln of the evidence over that at the likeliest amplitude alone, as probable beforehand as all of the grid together.
+    pub spread: f64,
     /// What the group explains of the squared residual at that amplitude.
-    pub(crate) fit: f64,
+    pub fit: f64,
 }
 
 impl GroupEvidence {
     /// Of a group that the rows do not see.
-    pub(crate) const NONE: Self = Self {
+    pub const NONE: Self = Self {
         log: 0.0,
         amplitude: 0.0,
+        spread: 0.0,
         fit: 0.0,
     };
 }
@@ -54,7 +57,7 @@ pub fn evidence(
 }
 
 /// The same where only amplitudes between two are possible, m.
-pub(crate) fn evidence_between(
+pub fn evidence_between(
     gram: &DMatrix<f64>,
     gradient: &DVector<f64>,
     shares: &[f64],
@@ -67,9 +70,11 @@ pub(crate) fn evidence_between(
     let best = (0..AMPLITUDES)
         .max_by(|a, b| logs[*a].total_cmp(&logs[*b]))
         .unwrap_or(0);
+    let all = log_sum(&logs);
     GroupEvidence {
-        log: log_sum(&logs) - (possible(between).max(1) as f64).ln(),
+        log: all - (possible(between).max(1) as f64).ln(),
         amplitude: GRID[best],
+        spread: all - logs[best],
         fit: fits[best],
     }
 }

@@ -7,14 +7,14 @@ use std::ops::Deref;
 use std::sync::OnceLock;
 
 /// Takes off a column what it has of another one of unit length.
-pub(crate) fn subtract(column: &mut [f64], other: &[f64]) {
+pub fn subtract(column: &mut [f64], other: &[f64]) {
     let share = dot(column, other);
     let each = column.iter_mut().zip(other);
     each.for_each(|(value, other)| *value -= share * other);
 }
 
 /// Scales a column to unit length; returns the length that it had.
-pub(crate) fn scale(column: &mut [f64]) -> f64 {
+pub fn scale(column: &mut [f64]) -> f64 {
     let length = dot(column, column).sqrt();
     let each = column.iter_mut();
     each.for_each(|value| *value /= length.max(1e-300));
@@ -23,7 +23,7 @@ pub(crate) fn scale(column: &mut [f64]) -> f64 {
 
 /// An orthonormal basis of what the columns of `matrix` can do that shows: of the directions that whitened rows know better than the
 /// parameters' standard deviations before any measurement, `sigmas`, do. Columns beyond these have any size.
-pub(crate) fn shown_directions(matrix: &Mat<f64>, sigmas: &[f64]) -> Mat<f64> {
+pub fn shown_directions(matrix: &Mat<f64>, sigmas: &[f64]) -> Mat<f64> {
     let scale = |j: usize| match sigmas.get(j) {
         Some(sigma) => *sigma,
         None => ANY / matrix.col(j).norm_l2().max(1e-300),
@@ -45,7 +45,7 @@ pub(crate) fn shown_directions(matrix: &Mat<f64>, sigmas: &[f64]) -> Mat<f64> {
 const ANY: f64 = 1e6;
 
 /// Removes from columns (one after another) what lies in the span of an orthonormal basis.
-pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
+pub fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
     let rows = basis.nrows();
     let count = columns.len() / rows.max(1);
     if basis.ncols() == 0 || count == 0 {
@@ -67,7 +67,7 @@ pub(crate) fn project(basis: MatRef<'_, f64>, columns: &mut [f64]) {
 }
 
 /// Transpose of `a` times `b`; where one has fewer rows the others count as zero.
-pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
+pub fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     let rows = a.nrows().min(b.nrows());
     let (a, b) = (a.subrows(0, rows), b.subrows(0, rows));
     let mut products = DMatrix::zeros(a.ncols(), b.ncols());
@@ -77,14 +77,14 @@ pub(crate) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
 }
 
 /// Columns, one after another, and the same line by line once somebody asks.
-pub(crate) struct Columns {
+pub struct Columns {
     columns: DMatrix<f64>,
     by_line: OnceLock<DMatrix<f64>>,
 }
 
 impl Columns {
     /// Columns x lines.
-    pub(crate) fn by_line(&self) -> &DMatrix<f64> {
+    pub fn by_line(&self) -> &DMatrix<f64> {
         self.by_line.get_or_init(|| self.columns.transpose())
     }
 }
@@ -107,16 +107,19 @@ impl Deref for Columns {
 }
 
 /// A matrix of one library as the other one sees it.
-pub(crate) fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
+#[inline]
+pub fn view(matrix: &DMatrix<f64>) -> MatRef<'_, f64> {
     MatRef::from_column_major_slice(matrix.as_slice(), matrix.nrows(), matrix.ncols())
 }
 
 /// The mean of squares; 0 of none.
-pub(crate) fn mean_square(values: &[f64]) -> f64 {
+pub fn mean_square(values: &[f64]) -> f64 {
     values.iter().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64
 }
 
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+/// The sum of the products of two columns.
+#[inline]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     // Four sums: the compiler may not reorder one.
     let (mut sums, chunks) = ([0.0; 4], a.len() / 4);
     for k in 0..chunks {
