@@ -11,9 +11,9 @@ use crate::diagnose::types::{KnownCell, Question};
 use crate::effect::{Survey, Term, Variable, cause, names};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
-use std::sync::OnceLock;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::AtomicU64;
+use std::sync::{Mutex, OnceLock};
 
 /// The table of cells over the rows of a recording.
 pub(super) struct CauseTable<'f, 'a> {
@@ -28,6 +28,8 @@ pub(super) struct CauseTable<'f, 'a> {
     /// The first of all coarse columns of each cell, and their number.
     pub(crate) first: Vec<usize>,
     pub(super) columns: usize,
+    /// Components in whose place nothing else comes near, with the numbers of those that did in part what they do.
+    pub(super) firm: Mutex<BTreeMap<u64, Vec<u64>>>,
     /// The number of the next component.
     pub(crate) next: AtomicU64,
     /// Keys of cells that are in the model around which the rows are looked at.
@@ -104,6 +106,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             known: ColumnProducts::default(),
             first: Vec::new(),
             columns: 0,
+            firm: Mutex::default(),
             next: AtomicU64::new(1),
             declared: declared.collect(),
             from_before: Vec::new(),

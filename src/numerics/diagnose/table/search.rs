@@ -12,6 +12,8 @@ use crate::criteria::cells::{
 };
 use crate::effect::{Form, Variable, names};
 use calib_engine::{AMPLITUDES, Accepted, Cause, Cell, GroupEvidence, Options, Problem, Scanned};
+use std::collections::BTreeMap;
+use std::sync::{MutexGuard, PoisonError};
 
 /// Components with the noise that fits them.
 #[derive(Clone)]
@@ -92,24 +94,19 @@ impl Problem for CauseTable<'_, '_> {
         before: Option<&StandingComponents>,
         _least: f64,
     ) -> StandingComponents {
-        let components = set.iter().map(|one| one.cell.key.clone()).collect();
-        let (components, kappa) = self.possible(components);
-        let changed = before.map_or_else(Vec::new, |before| {
-            let came = components
-                .iter()
-                .filter(|one| !before.components.contains(one));
-            let went = before
-                .components
-                .iter()
-                .filter(|one| !components.contains(one));
-            before
-                .changed
-                .iter()
-                .chain(came)
-                .chain(went)
-                .cloned()
-                .collect()
-        });
+        let components: Vec<Component> = set.iter().map(|one| one.cell.key.clone()).collect();
+        let Some(before) = before else {
+            let (components, kappa) = self.possible(components.clone(), &components);
+            return StandingComponents {
+                components,
+                kappa,
+                changed: Vec::new(),
+            };
+        };
+        let came = without_any(&components, &before.components);
+        let went = without_any(&before.components, &components);
+        let changed = [&before.changed[..], &came, &went].concat();
+        let (components, kappa) = self.possible(components, &changed);
         StandingComponents {
             components,
             kappa,
@@ -119,17 +116,9 @@ impl Problem for CauseTable<'_, '_> {
 
     /// Components that do in part what one does that came or went are estimated anew.
     fn settled(&self, fit: &StandingComponents) -> StandingComponents {
-        let components = fit.components.clone();
-        self.parts
-            .know(components.iter().chain(&fit.changed), self.frame);
-        let is_coupled = |one: &Component| {
-            let mut changed = fit.changed.iter();
-            changed.any(|other| one == other || self.parts.overlap(one, other) > *COUPLED)
-        };
-        let some: Vec<usize> = (0..components.len())
-            .filter(|i| is_coupled(&components[*i]))
-            .collect();
-        let (components, kappa) = self.possible(self.backfit_some(components, &some, 1));
+        let some = self.coupled(&fit.components, &fit.changed);
+        let components = self.backfit_some(fit.components.clone(), &some, 1);
+        let (components, kappa) = self.possible(components, &fit.changed);
         StandingComponents {
             components,
             kappa,
@@ -210,7 +199,13 @@ impl CauseTable<'_, '_> {
     /// Cells that say more than a component in its place.
     fn instead(&self, fit: &StandingComponents, out: usize) -> Vec<Scanned<Component>> {
         let component = &fit.components[out];
-        let state = self.state(&without(&fit.components, &[out]), Some(fit.kappa));
+        let others = without(&fit.components, &[out]);
+        let coupled = self.coupled(&others, std::slice::from_ref(component));
+        let beside: Vec<u64> = coupled.into_iter().map(|i| others[i].id).collect();
+        if self.firm().get(&component.id) == Some(&beside) {
+            return Vec::new();
+        }
+        let state = self.state(&others, Some(fit.kappa));
         let alike = self.alike(component, 24);
         let near: Vec<usize> = std::iter::once(component.cell)
             .chain(self.near(component))
@@ -219,13 +214,38 @@ impl CauseTable<'_, '_> {
         let scan = self.scan_instead(component, &alike, &state, 5, &near);
         let prior = self.log_prior(component.cell, &state.components);
         let stays = prior + self.log_evidence(component, &state);
-        let mut found = scan.likeliest(stays + *SWAPS);
-        found.retain(|(cell, _)| *cell != component.cell);
-        self.scanned(found, &scan)
+        let mut near = scan.likeliest(stays - *JOINS);
+        near.retain(|(cell, _)| *cell != component.cell);
+        if near.is_empty() {
+            self.firm().insert(component.id, beside);
+        }
+        near.retain(|(cell, _)| scan.log_odds[*cell] > stays + *SWAPS);
+        self.scanned(near, &scan)
     }
 
-    /// Components without those whose one coefficient would have a size that it cannot have, with the noise that fits them.
-    fn possible(&self, mut components: Vec<Component>) -> (Vec<Component>, f64) {
+    /// What is known of components in whose place nothing comes near.
+    fn firm(&self) -> MutexGuard<'_, BTreeMap<u64, Vec<u64>>> {
+        self.firm.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Positions of components that are among others, or do in part what one of these does.
+    fn coupled(&self, components: &[Component], others: &[Component]) -> Vec<usize> {
+        self.parts.know(components.iter().chain(others), self.frame);
+        let is_coupled = |i: &usize| {
+            let one = &components[*i];
+            let mut others = others.iter();
+            others.any(|other| one == other || self.parts.overlap(one, other) > *COUPLED)
+        };
+        (0..components.len()).filter(is_coupled).collect()
+    }
+
+    /// Components, where some changed, without those whose one coefficient would have a size that it cannot have, with the noise that fits
+    /// them.
+    fn possible(
+        &self,
+        mut components: Vec<Component>,
+        changed: &[Component],
+    ) -> (Vec<Component>, f64) {
         loop {
             let kappa = self.noise(&components);
             let cannot_be = |place: &usize| {
@@ -235,7 +255,8 @@ impl CauseTable<'_, '_> {
                         .component_evidence(&components[*place], &state())
                         .is_none()
             };
-            match (0..components.len()).find(cannot_be) {
+            let asked = self.coupled(&components, changed);
+            match asked.into_iter().find(cannot_be) {
                 Some(place) => _ = components.remove(place),
                 None => return (components, kappa),
             }
@@ -479,6 +500,15 @@ impl CauseTable<'_, '_> {
         }
         out
     }
+}
+
+/// Components that are not among others.
+fn without_any(components: &[Component], others: &[Component]) -> Vec<Component> {
+    let components = components.iter();
+    components
+        .filter(|one| !others.contains(one))
+        .cloned()
+        .collect()
 }
 
 /// Components without some of them.
