@@ -21,6 +21,7 @@ use calib_numerics::robot::{Measurements, RobotModel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Settings of `diagnose`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -299,7 +300,7 @@ const SORTED_OTHERWISE: &str = "rows stand in another order than their times (so
 
 /// The rows that a diagnosis is asked of, and the robot that they belong to.
 pub(super) struct AskedRows {
-    declared: Vec<&'static DeclaredCause>,
+    declared: Vec<Arc<DeclaredCause>>,
     known: Vec<KnownCell>,
     pub data: Measurements,
     pub corrected: Corrected,

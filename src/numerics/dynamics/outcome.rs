@@ -137,21 +137,21 @@ fn filters_remark(problem: &TorqueProblem) -> String {
 /// A finding whose name is not to be given is without one at its place, and so are its rivals.
 fn nameless(finding: &mut TorqueFinding, without: &[String]) {
     let is_left_out = |effect: &str| without.iter().any(|name| name == effect);
-    if is_left_out(finding.effect) {
-        finding.effect = UNKNOWN;
+    if is_left_out(&finding.effect) {
+        finding.effect = UNKNOWN.into();
         finding.statement = format!("something without a name acts at {}", finding.place);
     }
-    let here = (finding.effect, finding.place);
+    let here = (finding.effect.clone(), finding.place);
     for rival in finding
         .rivals
         .iter_mut()
-        .filter(|rival| is_left_out(rival.effect))
+        .filter(|rival| is_left_out(&rival.effect))
     {
-        rival.effect = UNKNOWN;
+        rival.effect = UNKNOWN.into();
     }
     let probabilities = &mut finding.probabilities;
     finding.rivals.retain(|rival| {
-        let is_same = (rival.effect, rival.place) == here;
+        let is_same = (&rival.effect, rival.place) == (&here.0, here.1);
         if is_same {
             let Probabilities { name, place, none } = *probabilities;
             *probabilities = Probabilities::new(name + rival.probability, place, none);
@@ -341,7 +341,7 @@ fn not_observable(fit: &FittedSet) -> Vec<String> {
             sentences.push(format!(
                 "{} {}: these motions do not show it",
                 form.place,
-                form.cause.name.replace('_', " ")
+                form.name().replace('_', " ")
             ));
         }
     }

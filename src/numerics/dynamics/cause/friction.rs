@@ -158,7 +158,7 @@ pub(super) static STRIBECK: TorqueCause = TorqueCause {
             usual: Some(1.0),
             ..span("exponent", "1", [0.4, 2.5])
         };
-        vec![speed, exponent, speed]
+        vec![speed.clone(), exponent, speed]
     },
     torque: ColumnTorque::Friction(|form, _, velocity, sign| sign * falls(form, velocity)),
     statement: |form, fitted, unit| {

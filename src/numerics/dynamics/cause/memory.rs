@@ -199,7 +199,7 @@ pub(super) static ELASTICITY: TorqueCause = TorqueCause {
             index: 1,
             ..span("damping", "1", [0.005, 0.6])
         };
-        vec![hertz, damping, hertz]
+        vec![hertz.clone(), damping, hertz]
     },
     torque: ColumnTorque::Course(|column, out| {
         let (scene, form) = (column.scene, column.form);
