@@ -41,7 +41,7 @@ pub struct TorqueParameter {
 }
 
 /// All causes with columns; latency and contacts are looked for before. What has no name comes last.
-pub(super) static TORQUE_CAUSES: [&TorqueCause; 29] = [
+pub(super) static TORQUE_CAUSES: [&TorqueCause; 30] = [
     &friction::VISCOUS_FRICTION,
     &friction::COULOMB_FRICTION,
     &angle::CURRENT_OFFSET,
@@ -58,6 +58,7 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 29] = [
     &angle::RIPPLE,
     &memory::ELASTICITY,
     &memory::SPIKES,
+    &memory::PLAY,
     &friction::WRIST_COUPLING,
     &masses::PAYLOAD,
     &masses::LINK_MASS,
