@@ -21,7 +21,7 @@ use calib_numerics::figures::measured;
 pub(super) use declared::{DECLARED, declared};
 pub use friction::COULOMB;
 pub(super) use friction::{
-    COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power, of_greatest_load,
+    COULOMB_FRICTION, LOAD_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power, of_greatest_load,
 };
 pub(super) use masses::{ADDED_MASS, CENTRE, PAYLOAD, ROTOR, TORQUE_CONSTANT, masses_on_links};
 use std::borrow::Cow;
@@ -491,6 +491,11 @@ impl TorqueForm {
             }
         }
         numbers
+    }
+
+    /// Whether it is its cause in the usual shape, with one coefficient.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.width == 1 && self.shape_numbers().is_empty()
     }
 
     /// Shape numbers that are found, as people read them.
