@@ -370,8 +370,8 @@ fn hidden_friction(fit: &FittedSet, number: usize) -> Option<String> {
     let place = problem.all.of(number).start;
     let column = &problem.all.columns[place];
     let size = largest(column.courses.iter().flatten());
-    let measured = column.joints.iter().map(|joint| &problem.measured[*joint]);
-    let torque = largest(measured.flatten());
+    let measured = (column.joints.iter()).map(|joint| problem.torque_at(*joint, problem.latency));
+    let torque = measured.fold(0.0, |most, course| f64::max(most, largest(&course)));
     let sigma = match fit.set.contains(&number) {
         true => fit.sweep.sigma(place),
         false => fit.sweep.with(&[number]).sigma(place),
