@@ -117,16 +117,21 @@ pub(super) fn document(remarks: &[String], template: &str, values: Value) -> Res
     let mut environment = crate::text::environment();
     environment.set_undefined_behavior(UndefinedBehavior::SemiStrict);
     environment.add_filter("xml", |text: &str| escape(text).into_owned());
+    let head = comments(remarks);
+    let body = environment
+        .render_str(template, values)
+        .map_err(|error| Error::Bug(error.to_string()))?;
+    Ok(format!("<?xml version=\"1.0\"?>\n{head}{body}"))
+}
+
+/// A comment a line.
+pub(super) fn comments(remarks: &[String]) -> String {
     // Two hyphens would end a comment; of three, the first pass leaves two.
     let comment = |line: &String| {
         let line = line.replace("--", "- -").replace("--", "- -");
         format!("<!-- {line} -->\n")
     };
-    let head: String = remarks.iter().map(comment).collect();
-    let body = environment
-        .render_str(template, values)
-        .map_err(|error| Error::Bug(error.to_string()))?;
-    Ok(format!("<?xml version=\"1.0\"?>\n{head}{body}"))
+    remarks.iter().map(comment).collect()
 }
 
 /// Numbers with blanks between them, each the shortest text that reads as the same number.

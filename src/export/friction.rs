@@ -1,9 +1,11 @@
 //! What formats hold of the identified torques: friction, rotor and drive of each joint. What they do not hold is listed.
 
+use super::body::numbers;
 use super::{CarriedTorques, Export, Format};
 use crate::criteria::torque::NAMED;
 use crate::dynamics::{COULOMB, FittedNumber, JointRange, TorqueTerm};
 use crate::effect::Place;
+use crate::figures::measured;
 use crate::identified::IdentifiedTorques;
 
 /// Causes that a format has an attribute for.
@@ -40,9 +42,31 @@ pub(super) fn stands_alone(torques: &IdentifiedTorques, term: &TorqueTerm) -> bo
     !drives && numbers.any(|row| row.sigma.is_none_or(|sigma| is_sure(row.value, sigma)))
 }
 
+/// A number with the digits that its standard deviation tells.
+pub(super) fn digits(number: FittedNumber) -> String {
+    measured(number.value, Some(number.sigma))
+}
+
+/// One standard deviation of a coefficient of a cause; 0 where it is not known.
+fn sigma(torques: &IdentifiedTorques, term: &TorqueTerm, coefficient: usize) -> f64 {
+    let place = term.place.to_string();
+    let mut rows = torques
+        .parameters
+        .0
+        .iter()
+        .filter(|row| row.effect == term.effect && row.place == place && row.form.is_some());
+    rows.nth(coefficient)
+        .and_then(|row| row.sigma)
+        .unwrap_or(0.0)
+}
+
 /// The coefficient of a cause of one number at a joint (from 0), SI; none where it was not found or does not stand alone. Of a law with a shape
 /// it is the number that formats can hold, see [`as_one_number`].
-pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usize) -> Option<f64> {
+pub(super) fn coefficient(
+    torques: &IdentifiedTorques,
+    effect: &str,
+    joint: usize,
+) -> Option<FittedNumber> {
     let mut terms = torques.model.terms.iter();
     let is_it = |term: &&TorqueTerm| term.effect == effect && term.place == Place::Joint(joint);
     let single = terms
@@ -50,9 +74,12 @@ pub(super) fn coefficient(torques: &IdentifiedTorques, effect: &str, joint: usiz
         .filter(|single| stands_alone(torques, single))?;
     let value = *single.coefficients.first()?;
     let seen = torques.model.range.get(joint)?;
-    let held = || as_one_number(single, value, seen, None).map(|(held, _)| held);
-    let line = of_line(torques, single).map(|line| line.value);
-    Some(line.or_else(held).unwrap_or(value))
+    let held = as_one_number(single, value, seen, None).map_or(value, |(held, _)| held);
+    let found = FittedNumber {
+        value: held,
+        sigma: sigma(torques, single, 0) * (held / value).abs(),
+    };
+    Some(of_line(torques, single).unwrap_or(found))
 }
 
 /// What formats of one number hold of a law that has a shape, and what must be remark of it: of friction that grows with another power of speed
@@ -85,12 +112,16 @@ fn as_one_number(
 }
 
 /// The same where formats allow no less than 0.
-pub(super) fn positive(torques: &IdentifiedTorques, effect: &str, joint: usize) -> Option<f64> {
-    coefficient(torques, effect, joint).filter(|value| *value > 0.0)
+pub(super) fn positive(
+    torques: &IdentifiedTorques,
+    effect: &str,
+    joint: usize,
+) -> Option<FittedNumber> {
+    coefficient(torques, effect, joint).filter(|found| found.value > 0.0)
 }
 
 /// The stiffness of a spring at a joint (from 0), Nm/rad, and the angle at which it rests, rad; none of one that is no straight line.
-pub(super) fn spring(torques: &IdentifiedTorques, joint: usize) -> Option<[f64; 2]> {
+pub(super) fn spring(torques: &IdentifiedTorques, joint: usize) -> Option<[FittedNumber; 2]> {
     let at = |term: &&TorqueTerm| {
         SPRINGS.contains(&term.effect.as_str()) && term.place == Place::Joint(joint)
     };
@@ -99,14 +130,26 @@ pub(super) fn spring(torques: &IdentifiedTorques, joint: usize) -> Option<[f64; 
     let [stiffness, at_zero] = single.coefficients[..] else {
         return None;
     };
-    (stiffness > 0.0).then(|| [stiffness, -at_zero / stiffness])
+    let [of_stiffness, of_zero] = [0, 1].map(|number| sigma(torques, single, number));
+    let numbers = [
+        (stiffness, of_stiffness),
+        (-at_zero / stiffness, of_zero / stiffness),
+    ];
+    (stiffness > 0.0).then(|| numbers.map(|(value, sigma)| FittedNumber { value, sigma }))
 }
 
 /// Nm at the joint per ampere as identified: the declared one where the drives' numbers are right, none where it is not declared.
-pub(super) fn gear(torques: &IdentifiedTorques, joint: usize) -> Option<f64> {
-    let declared = torques.per_ampere.as_ref()?.get(joint)?;
+pub(super) fn gear(torques: &IdentifiedTorques, joint: usize) -> Option<String> {
+    let declared = *torques.per_ampere.as_ref()?.get(joint)?;
     // Stated torques are so much more than true ones.
-    Some(declared / (1.0 + coefficient(torques, DRIVE, joint).unwrap_or(0.0)))
+    let gear = |more: FittedNumber| {
+        let whole = 1.0 + more.value;
+        digits(FittedNumber {
+            value: declared / whole,
+            sigma: declared.abs() * more.sigma / (whole * whole),
+        })
+    };
+    Some(coefficient(torques, DRIVE, joint).map_or_else(|| numbers([declared]), gear))
 }
 
 impl Export {

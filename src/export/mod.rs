@@ -9,6 +9,7 @@ mod flange;
 mod friction;
 mod json;
 mod mark;
+mod own_mjcf;
 mod own_urdf;
 mod rigid;
 mod ur_kinematics;

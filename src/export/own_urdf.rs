@@ -1,6 +1,7 @@
 //! The URDF that a model was identified with: links, limits and frames as its author has them.
 
 use super::Export;
+use super::own_mjcf::is_mjcf;
 use crate::error::{Error, Result};
 use crate::raw::{self, ending};
 use crate::spatial::Pose;
@@ -59,14 +60,20 @@ impl OwnUrdf {
             let is = move |source: &&PathBuf| wanted.contains(&ending(source).as_str());
             sources.iter().filter(is)
         };
-        let Some(path) = with_ending(["urdf", "xml"]).next() else {
-            return Ok(None);
-        };
-        let label = path.display().to_string();
         let read = |path: &PathBuf| {
             raw::text(path).map_err(|error| Error::unreadable(path.display().to_string(), &error))
         };
-        let text = read(path)?;
+        let mut found = None;
+        for path in with_ending(["urdf", "xml"]) {
+            let text = read(path)?;
+            if !is_mjcf(&text) {
+                found = found.or(Some((path, text)));
+            }
+        }
+        let Some((path, text)) = found else {
+            return Ok(None);
+        };
+        let label = path.display().to_string();
         let [mut base, mut tip] = [None, None];
         for file in with_ending(["yaml", "yml"]) {
             let tree = yaml::parse(&read(file)?).0;

@@ -3,7 +3,10 @@
 //! a URDF that is written after the arm's own, whose frames and names it has.
 
 use super::body::{LinkBody, document, moved, numbers, origin, tool};
-use super::friction::{ARMATURE, DAMPING, DRIVE, FRICTION, SPRINGS, gear, positive, spring};
+use super::friction::{
+    ARMATURE, DAMPING, DRIVE, FRICTION, SPRINGS, digits, gear, positive, spring,
+};
+use super::own_mjcf::OwnMjcf;
 use super::own_urdf::{OwnJoint, OwnUrdf};
 use super::{CarriedGeometry, CarriedTorques, Export, Format};
 use crate::description::{JointDescription, JointKind};
@@ -108,7 +111,12 @@ fn sdf(export: &Export) -> Result<String> {
     document(&remarks, include_str!("sdf.xml"), arm(export, None))
 }
 
+/// A copy of the arm's own MJCF where the pipeline names one and torques alone were identified.
 fn mjcf(export: &Export) -> Result<String> {
+    let own = OwnMjcf::of(export)?;
+    if let Some(own) = own.filter(|_| export.identified.is_of_torques_alone()) {
+        return own.with_torques(export);
+    }
     let mut remarks = export.remarks_in(&MJCF);
     if !export.corrected.couplings.is_empty() {
         remarks.push(
@@ -148,8 +156,11 @@ fn arm(export: &Export, own: Option<&OwnUrdf>) -> Value {
             (JointKind::Revolute, None) => "continuous",
         };
         let torques = export.identified.torques.as_ref();
-        let text = |value: Option<f64>| value.map(|value| numbers([value]));
-        let found = |effect| text(torques.and_then(|torques| positive(torques, effect, index)));
+        let found = |effect| {
+            torques
+                .and_then(|torques| positive(torques, effect, index))
+                .map(digits)
+        };
         let spring = torques.and_then(|torques| spring(torques, index));
         let body = export.body(index).map(|body| {
             // Its numbers are in a frame at the joint's point that is parallel to the base.
@@ -175,8 +186,8 @@ fn arm(export: &Export, own: Option<&OwnUrdf>) -> Value {
             limits => joint.limits.map(|limits| limits.map(|limit| numbers([limit]))),
             effort => limit(|own| &own.effort), velocity => limit(|own| &own.velocity),
             damping => found(DAMPING), friction => found(FRICTION), armature => found(ARMATURE),
-            stiffness => text(spring.map(|[stiffness, _]| stiffness)), springref => text(spring.map(|[_, reference]| reference)),
-            gear => text(torques.and_then(|torques| gear(torques, index))),
+            stiffness => spring.map(|[stiffness, _]| digits(stiffness)), springref => spring.map(|[_, reference]| digits(reference)),
+            gear => torques.and_then(|torques| gear(torques, index)),
         });
         (before, parent) = (frame, child);
     }
@@ -238,11 +249,11 @@ fn shortfalls(export: &Export) -> Vec<String> {
     };
     let [time, impedance] = DRY;
     let line = |(index, joint): (usize, &JointDescription)| {
-        let friction = positive(torques, FRICTION, index)?;
+        let friction = positive(torques, FRICTION, index)?.value;
         let own = export.body(index).map(|body| about_axis(&body, joint));
         let least: f64 = LEAST[1].parse().unwrap_or_default();
-        let inertia =
-            own.unwrap_or(least).max(least) + positive(torques, ARMATURE, index).unwrap_or(0.0);
+        let inertia = own.unwrap_or(least).max(least)
+            + positive(torques, ARMATURE, index).map_or(0.0, |found| found.value);
         let speed = friction * (1.0 - impedance) * time / (2.0 * inertia);
         (speed > SLOW).then(|| {
             format!(

@@ -172,6 +172,8 @@ const OF_MOTORS: &str =
 const EXPECTED: &str =
     "by its name what the controller's own model expects; is it the measured torque at the joint?";
 const MODELLED: &str = "what the controller's own model expects: what it lacks is looked for; leave the line out to hold the declared masses against the torques";
+const BY_CONSTANTS: &str =
+    "a torque by reduction_ratio and motor_constant (Nm/A) of each joint in the robot file";
 const EFFORT: &str = "drivers of ROS state torques or motor currents as effort";
 
 /// A robot file whose measured point needs no look: no torque depends on it.
@@ -299,7 +301,7 @@ impl ExaminedFile {
                 &currents,
                 unit.unwrap_or("A"),
                 unit.is_some(),
-                None,
+                Some(BY_CONSTANTS),
             );
             if !torques.is_empty() {
                 self.drop("current", "torques are mapped; one of the two is used");

@@ -151,11 +151,12 @@ fn effects(chosen: &[String], robot: &RobotModel, site: &Site) -> NamedEffects {
     };
     let setting = setting();
     let (mut kept, mut left) = (Vec::new(), Vec::new());
-    for effect in identified().filter_map(|cause| cause.arm_effect(&setting)) {
-        if chosen.is_empty() || chosen.iter().any(|name| name == effect.name()) {
+    let all = identified().filter_map(|cause| Some((cause.name, cause.arm_effect(&setting)?)));
+    for (name, effect) in all {
+        if chosen.is_empty() || chosen.iter().any(|one| one == name) {
             match effect.missing(robot, &data) {
-                Some(reason) => left.push((effect.name(), reason)),
-                None => kept.push(effect.name()),
+                Some(reason) => left.push((name, reason)),
+                None => kept.push(name),
             }
         }
     }

@@ -21,6 +21,7 @@ use calib_numerics::robot::{Measurements, RobotModel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Settings of `diagnose`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -103,7 +104,7 @@ pub(super) fn must_be_a_prior(open_world: f64, at: &mut Place) {
 }
 
 crate::stage! {
-    Diagnose, "diagnose", 55, "locates where simulation and recording differ, and names the physics that the model leaves out",
+    Diagnose, "diagnose", 56, "locates where simulation and recording differ, and names the physics that the model leaves out",
         DiagnoseReads {
             robot: Robot,
             recording: Recording,
@@ -299,7 +300,7 @@ const SORTED_OTHERWISE: &str = "rows stand in another order than their times (so
 
 /// The rows that a diagnosis is asked of, and the robot that they belong to.
 pub(super) struct AskedRows {
-    declared: Vec<&'static DeclaredCause>,
+    declared: Vec<Arc<DeclaredCause>>,
     known: Vec<KnownCell>,
     pub data: Measurements,
     pub corrected: Corrected,

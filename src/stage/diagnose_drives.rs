@@ -287,7 +287,7 @@ struct ToleranceFile {
 impl Stage for DiagnoseDrives {
     fn faults(&self, at: &mut Place) {
         crate::must_name_sets(&self.on, "fit", at);
-        let names: Vec<&str> = CAUSES.iter().map(|cause| cause.name).collect();
+        let names: Vec<&str> = CAUSES.iter().map(|cause| &*cause.name).collect();
         for (k, name) in self.without.iter().enumerate() {
             let known = names.contains(&name.as_str());
             let hint = did_you_mean(name, names.iter().copied());

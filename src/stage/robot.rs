@@ -34,6 +34,9 @@ pub struct ReadRobot {
     /// The URDF that `kinematics: {urdf: {base: .., tip: ..}}` of the robot file refers to.
     #[serde(default)]
     pub urdf: Option<RawFile>,
+    /// The arm's MJCF, which is not read here: `calib export --format mjcf` writes what was identified of torques into a copy of it.
+    #[serde(default)]
+    pub mjcf: Option<RawFile>,
 }
 
 crate::stage! {
@@ -52,8 +55,9 @@ impl Stage for ReadRobot {
 
     fn files(&self) -> Vec<(String, RawFile)> {
         let urdf = self.urdf.iter().map(|file| ("urdf".into(), file.clone()));
+        let mjcf = self.mjcf.iter().map(|file| ("mjcf".into(), file.clone()));
         let file = [("file".into(), self.file.clone())];
-        file.into_iter().chain(urdf).collect()
+        file.into_iter().chain(urdf).chain(mjcf).collect()
     }
 
     fn look(&self, reads: Option<RobotReads>, context: &Context) -> Result<Option<RobotWrites>> {

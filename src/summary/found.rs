@@ -295,7 +295,11 @@ fn number(shown: &str, all: &[FoundNumber]) -> Option<String> {
         "No" => None,
         "Largest" => largest.map(written),
         "Size" => times(1.0),
-        "Twice" => times(2.0),
+        // Of torques and drives the whole of it is a number.
+        "Twice" => match all.iter().find(|one| one.name == "play") {
+            Some(whole) => Some(written(whole)),
+            None => times(2.0),
+        },
         "Amplitude" => amplitude(all),
         name => {
             let is_called = |one: &&FoundNumber| {

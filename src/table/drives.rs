@@ -23,7 +23,7 @@ impl Findings {
     pub fn of_drives(diagnosis: &DriveDiagnosis) -> Self {
         let rows = ranked(&diagnosis.findings).map(|(rank, finding)| FindingRow {
             rank,
-            effect: finding.effect.into(),
+            effect: finding.effect.clone().into(),
             place: finding.place.clone(),
             follows: Some(finding.follows.into()),
             statement: finding.statement.clone(),

@@ -67,7 +67,7 @@ macro_rules! beside_findings {
                     $crate::findings::ranked(&diagnosis.findings).flat_map(|(rank, finding)| {
                         finding.rivals.iter().map(move |rival| $rival_row {
                             rank,
-                            effect: rival.effect.into(),
+                            effect: rival.effect.clone().into(),
                             place: rival.place.to_string(),
                             delta_bic: rival.delta_bic,
                             probability: rival.probability.into(),
@@ -116,7 +116,7 @@ impl Findings {
             };
             FindingRow {
                 rank,
-                effect: finding.effect.into(),
+                effect: finding.effect.clone().into(),
                 place: finding.place.to_string(),
                 follows: finding
                     .forms
@@ -165,7 +165,7 @@ impl Shares {
                     share: share.share,
                     numbers: share.parameters as i64,
                     delta_bic: share.delta_bic,
-                    effect: share.effect.into(),
+                    effect: share.effect.clone().into(),
                 })
             });
         Self(rows.collect())
@@ -185,7 +185,7 @@ impl Cells {
                     follows: cell.follows.into(),
                     explains_mm: lengths.then_some(1e3 * cell.explains),
                     delta_bic: cell.delta_bic,
-                    effect: cell.effect.into(),
+                    effect: cell.effect.clone().into(),
                 })
             });
         Self(rows.collect())

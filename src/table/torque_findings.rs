@@ -20,7 +20,7 @@ impl TorqueFindings {
     pub fn of(diagnosis: &TorqueDiagnosis) -> Self {
         let rows = ranked(&diagnosis.findings).map(|(rank, finding)| TorqueFindingRow {
             rank,
-            effect: finding.effect.into(),
+            effect: finding.effect.clone().into(),
             place: finding.place.to_string(),
             follows: Some(finding.follows.into()),
             statement: finding.statement.clone(),

@@ -59,7 +59,7 @@ fn zero_parameters_are_the_nominal_robot() {
         let data = data(&robot, 20);
         for effect in all_effects(Load::GravityTorque) {
             let setting = setting(Load::GravityTorque);
-            let name = effect.name();
+            let name = effect.name().to_string();
             let stack = EffectStack::new(&robot, setting.base, vec![effect]);
             let zeros = vec![0.0; stack.specs().len()];
             let mut scratch = stack.scratch(&robot);

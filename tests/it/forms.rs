@@ -494,13 +494,13 @@ fn a_joint_that_slides_errs_at_millimetres_and_has_no_turns() {
     let (rows, torque) = ((0..data.rows()).collect::<Vec<_>>(), torques(&robot, &data));
     let compliance = vec![COMPLIANCE; robot.joints()];
     let survey = Survey::new(&robot, &data, &rows, &torque, &compliance);
-    let named: BTreeSet<&str> = CAUSES
+    let named: BTreeSet<String> = CAUSES
         .iter()
         .flat_map(|cause| cause.propose(&survey))
         .filter(|hypothesis| hypothesis.form.place() == Place::Joint(0))
-        .map(|hypothesis| hypothesis.form.name())
+        .map(|hypothesis| hypothesis.form.name().to_string())
         .collect();
-    assert_eq!(named, BTreeSet::from(["zero_shift"]));
+    assert_eq!(named, BTreeSet::from(["zero_shift".to_string()]));
     let by_length = |joint: usize| {
         let all = unnamed(&survey)
             .into_iter()

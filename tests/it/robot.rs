@@ -387,6 +387,7 @@ fn the_stage_reads_every_practice_robot() {
             file: RawFile("robot.json".into()),
             format: RobotFormat::Case,
             urdf: None,
+            mjcf: None,
         };
         let tables = desk
             .run(&stage, RobotReads {})
@@ -420,6 +421,7 @@ fn the_stage_reads_the_urdf_beside_a_robot_file() {
         file: RawFile("robot.yaml".into()),
         format: RobotFormat::Calib,
         urdf,
+        mjcf: None,
     };
     assert_eq!(stage.files().len(), 2, "both contents are part of the key");
     let tables = desk.run(&stage, RobotReads {}).unwrap();

@@ -9,6 +9,7 @@ mod hostile;
 mod masses;
 mod nulls;
 mod own_laws;
+mod play;
 mod recordings;
 mod results;
 mod rigid;

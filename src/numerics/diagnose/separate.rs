@@ -12,6 +12,7 @@ use crate::effect::{
 use crate::estimate::Model;
 use crate::estimate::choose::{Alternative, DiscriminationProblem};
 use crate::robot::Measurements;
+use std::sync::Arc;
 
 /// A diagnosed model where it stands.
 pub struct DiagnosedModel<'a> {
@@ -107,11 +108,11 @@ fn rivals(
     (effect, place): (&str, Place),
 ) -> Result<Vec<Form>, String> {
     let declared = |(other, _): (&dyn Effect, std::ops::Range<usize>)| {
-        Some(other.form()?.declared()?.declaration())
+        Some(other.form()?.declared()?.declaration().clone())
     };
-    let mut declared_causes: Vec<&'static DeclaredCause> =
+    let mut declared_causes: Vec<Arc<DeclaredCause>> =
         model.stack.effects().filter_map(declared).collect();
-    declared_causes.dedup_by_key(|cause| &cause.declaration().name);
+    declared_causes.dedup_by(|a, b| a.name() == b.name());
     let question = Question {
         robot: survey.robot,
         data: survey.data,

@@ -4,6 +4,8 @@ use crate::effect::{DeclaredCause, EffectDeclaration, Form, ParameterEstimate, P
 use crate::estimate::{Fitted, Folds, Model, Screening};
 use crate::observation::Dimension;
 use crate::robot::{Measurements, NoiseBasis, RobotModel};
+use std::borrow::Cow;
+use std::sync::Arc;
 
 /// What is to be diagnosed.
 pub struct Question<'a> {
@@ -25,7 +27,7 @@ pub struct Question<'a> {
     /// Names that are not given: the cells of these causes stay and are `unknown`; of the base model, causes that are not fitted.
     pub without: &'a [String],
     /// Effects that the user declares: cells beside those of the library.
-    pub declared: &'a [&'static DeclaredCause],
+    pub declared: &'a [Arc<DeclaredCause>],
     /// Whether the points stand beside an outside simulation: what moves them says nothing of the robot file.
     pub beside_simulation: bool,
     /// What other robots of the model say of cells; empty where nothing is known of any.
@@ -77,7 +79,7 @@ pub struct Evidence {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RivalCause {
     /// Canonical name of the cause.
-    pub effect: &'static str,
+    pub effect: Cow<'static, str>,
     /// Where it acts.
     pub place: Place,
     /// Twice ln of the posterior odds of the finding against it.
@@ -110,7 +112,7 @@ impl Probabilities {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// Canonical name of the cause, or [`SETUP`].
-    pub effect: &'static str,
+    pub effect: Cow<'static, str>,
     /// Where it acts.
     pub place: Place,
     /// The finding in a sentence, with its size.
@@ -155,9 +157,9 @@ pub const SETUP: &str = "setup";
 
 impl Finding {
     /// A fault of the recording, no physics.
-    pub(crate) fn of_recording(effect: &'static str, statement: String, probability: f64) -> Self {
+    pub(crate) fn of_recording(effect: &str, statement: String, probability: f64) -> Self {
         Self {
-            effect,
+            effect: Cow::Owned(effect.into()),
             place: Place::Recording,
             statement,
             parameters: Vec::new(),
@@ -189,7 +191,7 @@ pub struct ExplainedShare {
     /// Twice ln of its posterior odds: positive where it is likelier than nothing.
     pub delta_bic: f64,
     /// The name of the cell.
-    pub effect: &'static str,
+    pub effect: Cow<'static, str>,
 }
 
 /// A cell of the table of causes: a place, and the kind of variable that something there follows.
@@ -204,7 +206,7 @@ pub struct ExplainedCell {
     /// Twice ln of its posterior odds: positive where it is likelier than nothing.
     pub delta_bic: f64,
     /// The name of the likeliest cause there.
-    pub effect: &'static str,
+    pub effect: Cow<'static, str>,
 }
 
 /// What a sine and a cosine of an order explain of the residual.

@@ -8,6 +8,7 @@ use crate::problem::Drives;
 use crate::rollout::Which;
 use crate::steps::HALVED;
 use calib_engine::{Accepted, Cell, Finding, Options};
+use std::borrow::Cow;
 
 /// A number of a finding.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,7 +27,7 @@ pub struct DriveNumber {
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveRival {
     /// A cause.
-    pub effect: &'static str,
+    pub effect: Cow<'static, str>,
     /// Where it would act.
     pub place: String,
     /// Twice the ln of the odds of the finding against it.
@@ -39,7 +40,7 @@ pub struct DriveRival {
 #[derive(Debug, Clone, PartialEq)]
 pub struct DriveFinding {
     /// Its cause.
-    pub effect: &'static str,
+    pub effect: Cow<'static, str>,
     /// Where it acts.
     pub place: String,
     /// The kind of variable that it follows: own speed, own angle, load, acceleration, error of the drive, command, time, constant ..
@@ -255,7 +256,7 @@ impl Drives {
             });
         }
         DriveFinding {
-            effect: cell.cause.name,
+            effect: cell.cause.name.clone(),
             place: cell.place.clone(),
             follows: cell.key.variable().unwrap_or(cell.cause.follows),
             statement: sentence(cell),
@@ -269,7 +270,7 @@ impl Drives {
                 .rivals
                 .iter()
                 .map(|rival| DriveRival {
-                    effect: rival.accepted.cell.cause.name,
+                    effect: rival.accepted.cell.cause.name.clone(),
                     place: rival.accepted.cell.place.clone(),
                     delta_bic: -2.0 * rival.log_odds,
                     probability: rival.probability,

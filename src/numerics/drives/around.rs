@@ -106,7 +106,7 @@ impl Drives {
             {
                 cell.shapes.truncate(1);
             }
-            let wanted = !self.without.iter().any(|name| name == cell.cause.name);
+            let wanted = !self.without.iter().any(|name| *name == cell.cause.name);
             (seen && wanted).then_some(Candidate { cell, instead })
         };
         let all = cells(&self.base, &self.usual, self.recording.period, self.shown);

@@ -3,10 +3,11 @@
 use crate::key::Key;
 use crate::physics::{Over, Physics};
 use calib_engine::{Cause, Cell, Number, Shape};
+use std::borrow::Cow;
 
 macro_rules! causes {
     ($( $id:ident = $name:literal, $follows:literal, $odds:literal, $sentence:literal, [$( $number:literal $unit:literal $log:literal ),*]; )*) => {
-        $( static $id: Cause = Cause { name: $name, follows: $follows, sentence: $sentence, log_prior: $odds,
+        $( static $id: Cause = Cause { name: Cow::Borrowed($name), follows: $follows, sentence: $sentence, log_prior: $odds,
             numbers: &[$( Number { name: $number, unit: $unit, by_logarithm: $log } ),*] }; )*
         /// Every cause, a row each.
         pub static CAUSES: &[&Cause] = &[$( &$id ),*];
@@ -77,7 +78,7 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
             let log_prior = cause.log_prior - (places as f64).ln();
             all.push(Cell {
                 key,
-                cause: *cause,
+                cause: cause.clone(),
                 place,
                 log_prior,
                 shapes,

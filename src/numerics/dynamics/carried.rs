@@ -33,7 +33,7 @@ impl Carried {
     pub(crate) fn of(form: &TorqueForm) -> Option<Self> {
         match form.place {
             Place::Tool => Some(Self::OnTool),
-            _ if form.cause.name == ADDED_MASS.name => Some(Self::OnLink),
+            _ if form.name() == ADDED_MASS.name => Some(Self::OnLink),
             _ => None,
         }
     }

@@ -223,7 +223,7 @@ fn wrong_torque_constants_of_three_joints_are_these_and_no_masses() {
         );
     }
     let masses = ["payload_error", "link_mass", "link_com", "link_inertia"];
-    let mut effects = diagnosis.findings.iter().map(|finding| finding.effect);
+    let mut effects = diagnosis.findings.iter().map(|finding| &*finding.effect);
     assert!(
         effects.all(|effect| !masses.contains(&effect)),
         "{:?}",

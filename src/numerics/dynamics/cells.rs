@@ -12,6 +12,7 @@ use crate::diagnose::table::KnownState;
 use calib_engine::{AMPLITUDES, EvidenceRows, evidence, log_sum};
 use crate::effect::Place;
 use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
@@ -48,7 +49,7 @@ impl<'a> CauseChoice<'a> {
 
     /// Whether a form may be chosen.
     pub(super) fn is_open(&self, number: usize) -> bool {
-        number < self.open && !(self.is_named && self.form(number).cause.name == UNKNOWN)
+        number < self.open && !(self.is_named && self.form(number).name() == UNKNOWN)
     }
 
     pub(crate) fn form(&self, number: usize) -> &TorqueForm {
@@ -70,7 +71,7 @@ impl<'a> CauseChoice<'a> {
     ) -> bool {
         let (form, cause) = (self.form(number), self.form(number).cause);
         let is_curve = |one: &TorqueForm| one.place == form.place && one.is_nameless_curve();
-        let only_positive = cause.positive || (cause.brakes && !self.has(set, is_curve));
+        let only_positive = form.is_positive() || (cause.brakes && !self.has(set, is_curve));
         (!only_positive || rises())
             && (cause.is_itself)(form, &self.problem.scene)
             && (cause.is_possible)(form, &values())
@@ -93,7 +94,7 @@ impl<'a> CauseChoice<'a> {
 
     /// Viscous and Coulomb friction of every joint: hardly an arm is without.
     pub(super) fn common(&self) -> Vec<usize> {
-        let common = |number: &usize| [VISCOUS, COULOMB].contains(&self.form(*number).cause.name);
+        let common = |number: &usize| [VISCOUS, COULOMB].contains(&self.form(*number).name());
         (0..self.open).filter(common).collect()
     }
 
@@ -108,13 +109,14 @@ impl<'a> CauseChoice<'a> {
     /// other without being in its uncertainty.
     pub(crate) fn other_friction(&self, set: &[usize]) -> Vec<usize> {
         let missing = |number: &usize| {
-            let TorqueForm { cause, place, .. } = self.form(*number);
-            let other = match cause.name {
+            let form = self.form(*number);
+            let (name, place) = (form.name(), form.place);
+            let other = match name {
                 VISCOUS => COULOMB,
                 _ => VISCOUS,
             };
-            !self.has(set, |form| form.is_called(cause.name, *place))
-                && self.has(set, |form| form.is_called(other, *place))
+            !self.has(set, |form| form.is_called(name, place))
+                && self.has(set, |form| form.is_called(other, place))
         };
         let sweep = self.base.with(set);
         let missing = self.common().into_iter().filter(missing);
@@ -125,7 +127,7 @@ impl<'a> CauseChoice<'a> {
 
 /// A cause at a place in every shape that is listed of it.
 pub(super) struct TorqueCell {
-    pub(super) name: &'static str,
+    pub(super) name: Cow<'static, str>,
     pub(super) place: Place,
     pub(super) log_prior: f64,
     /// Numbers of its forms.
@@ -173,8 +175,12 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
         let all = &choice.problem.all;
         let mut keys: BTreeMap<_, Vec<usize>> = BTreeMap::new();
         for (number, form) in all.forms.iter().enumerate() {
-            let cause = form.cause;
-            let key = (cause.name, form.kind(), form.place, (cause.cell)(form));
+            let key = (
+                form.name(),
+                form.kind(),
+                form.place,
+                (form.cause.cell)(form),
+            );
             keys.entry(key).or_default().push(number);
         }
         let cells = keys.into_iter().map(|((name, _, place, _), forms)| {
@@ -185,7 +191,7 @@ impl<'a, 'b> TorqueTable<'a, 'b> {
                 false => 0.0,
             };
             TorqueCell {
-                name,
+                name: Cow::Owned(name.into()),
                 place,
                 log_prior: COMMON.ln() - 0.5 * prices.fold(f64::INFINITY, f64::min) + open,
                 forms,

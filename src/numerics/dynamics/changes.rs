@@ -272,7 +272,7 @@ fn change(
     let names = form.coefficient_names().into_iter().enumerate();
     names
         .map(|(k, (quantity, unit))| {
-            let effect = form.cause.name;
+            let effect = form.name();
             let unit = unit_at(form.slides(&problem.scene.arm.prismatic), unit);
             let name = format!("{effect}.{}.{quantity}", form.place.tag());
             let sigma = covariance[k * (count + 1)].max(0.0).sqrt();
@@ -424,12 +424,12 @@ impl StackedColumns {
 
     /// A form as the engine has it.
     fn accepted(&self, form: usize) -> Accepted<usize> {
-        let TorqueForm { cause, place, .. } = &self.all.forms[form];
+        let form_of = &self.all.forms[form];
         Accepted {
             cell: Cell {
                 key: form,
-                cause: Cause::named(cause.name),
-                place: place.to_string(),
+                cause: Cause::named(form_of.name().to_string().into()),
+                place: form_of.place.to_string(),
                 log_prior: -0.5 * PRICE,
                 shapes: Vec::new(),
                 needs: Vec::new(),

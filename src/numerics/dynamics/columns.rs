@@ -341,9 +341,7 @@ impl TorqueColumns {
     /// Columns of a form by those of one at another joint, where they are alike.
     pub(crate) fn alike(&self, form: &TorqueForm) -> Option<Vec<TorqueColumn>> {
         let known = self.forms.iter().position(|known| {
-            form.cause.alike_at_joints
-                && known.cause.name == form.cause.name
-                && known.with == form.with
+            form.cause.alike_at_joints && known.name() == form.name() && known.with == form.with
         })?;
         let here = |column: &TorqueColumn| TorqueColumn {
             joints: vec![form.joint()],

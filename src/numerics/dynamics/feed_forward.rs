@@ -78,7 +78,7 @@ impl TorqueModel {
         if motion.since_start.is_none()
             && let Some(law) = forms
                 .iter()
-                .filter_map(|form| form.cause.declared)
+                .filter_map(|form| form.law.as_ref())
                 .find(|law| law.asks_time())
         {
             let message = format!(
@@ -275,7 +275,7 @@ impl JointRange {
             true => (value.abs() / most - 1.0).max(0.0),
             false => 0.0,
         };
-        let load = match form.cause.of_rigid {
+        let load = match form.is_of_rigid() {
             true => above(scene.rigid[joint][row], self.load),
             false => 0.0,
         };

@@ -18,6 +18,7 @@ use crate::diagnose::{Evidence, Probabilities, RivalCause};
 use crate::effect::Place;
 use crate::estimate::tail;
 use crate::statistics::nearest;
+use std::borrow::Cow;
 
 /// A set fitted with the base, and what is not known of its numbers.
 pub(super) struct FittedSet<'a> {
@@ -67,12 +68,15 @@ impl<'a> FittedSet<'a> {
             finding.evidence.delta_bic = 2.0 * (one.log_odds - table.log_prior(number));
             let rivals = one.rivals.iter().map(|rival| {
                 let cell = &table.cells[rival.accepted.cell.key];
-                ((cell.name, cell.place), one.log_odds + rival.log_odds)
+                (
+                    (cell.name.clone(), cell.place),
+                    one.log_odds + rival.log_odds,
+                )
             });
             weighed(finding, (one.log_odds, rivals.collect()))
         });
         let is_named = |finding: &TorqueFinding| {
-            [VISCOUS, COULOMB].contains(&finding.effect) || finding.probabilities.name >= *RIVAL
+            [VISCOUS, COULOMB].contains(&&*finding.effect) || finding.probabilities.name >= *RIVAL
         };
         let mut found: Vec<TorqueFinding> = found.filter(is_named).collect();
         found.sort_by(|a, b| b.evidence.gain.total_cmp(&a.evidence.gain));
@@ -107,7 +111,7 @@ impl<'a> FittedSet<'a> {
             }
         }
         TorqueFinding {
-            effect: form.cause.name,
+            effect: Cow::Owned(form.name().into()),
             place: form.place,
             follows: (form.cause.follows)(form),
             statement: (form.cause.statement)(form, &fitted, unit),
@@ -151,7 +155,7 @@ impl<'a> FittedSet<'a> {
         })?;
         let exponent = self.choice.form(power).shape[0];
         let fastest = largest(&self.choice.problem.scene.velocity[form.joint()]);
-        let (column, is_viscous) = (all.of(power).start, form.cause.name == VISCOUS);
+        let (column, is_viscous) = (all.of(power).start, form.name() == VISCOUS);
         let of_exponent = |exponent: f64| line_of_power(exponent, fastest)[usize::from(is_viscous)];
         let mut along = vec![(column, of_exponent(exponent))];
         if !is_viscous {
@@ -197,7 +201,7 @@ fn evidence(gain: f64, numbers: f64) -> Evidence {
 }
 
 /// ln of posterior odds, and those of rivals.
-type CellOdds = (f64, Vec<((&'static str, Place), f64)>);
+type CellOdds = (f64, Vec<((Cow<'static, str>, Place), f64)>);
 
 /// A finding with its probabilities: those of its name, of all that could stand in its place, and of nothing.
 fn weighed(mut finding: TorqueFinding, (log_odds, rivals): CellOdds) -> TorqueFinding {
@@ -210,7 +214,7 @@ fn weighed(mut finding: TorqueFinding, (log_odds, rivals): CellOdds) -> TorqueFi
         if place == finding.place {
             here += probability;
         }
-        if (effect, place) != (finding.effect, finding.place) && probability > *RIVAL {
+        if (&effect, place) != (&finding.effect, finding.place) && probability > *RIVAL {
             finding.rivals.push(RivalCause {
                 effect,
                 place,
@@ -252,7 +256,7 @@ pub(super) fn plain_finding(
     columns: f64,
 ) -> TorqueFinding {
     let finding = TorqueFinding {
-        effect,
+        effect: effect.into(),
         place,
         follows: "time",
         statement,
@@ -306,8 +310,8 @@ impl FittedSet<'_> {
         let term = |number: &usize| {
             let form = choice.form(*number);
             TorqueTerm {
-                effect: form.cause.name.into(),
-                declared: form.cause.declared.cloned(),
+                effect: form.name().into(),
+                declared: form.law.as_deref().cloned(),
                 place: form.place,
                 with: form.with,
                 shape: form.shape.clone(),

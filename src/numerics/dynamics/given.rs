@@ -122,7 +122,7 @@ impl TorqueTable<'_, '_> {
     ) -> CellAnswer {
         let cell = self.cell_of[&form];
         let TorqueCell {
-            name,
+            ref name,
             place,
             log_prior,
             ..
@@ -131,7 +131,7 @@ impl TorqueTable<'_, '_> {
             left_out: left_out.map(Into::into),
             cell: self.key(cell),
             shape: None,
-            effect: name,
+            effect: name.clone(),
             place,
             follows: {
                 let form = self.choice.form(form);

@@ -2,11 +2,13 @@
 
 use super::arm::{INERTIAL_NUMBERS, inertial_name, inertial_unit};
 use super::cause::{
-    COULOMB, FittedNumber, TORQUE_CAUSES, TorqueForm, VISCOUS, declared, line_of_power, slope,
+    COULOMB, DECLARED, FittedNumber, TORQUE_CAUSES, TorqueCause, TorqueForm, VISCOUS,
+    line_of_power, slope,
 };
 use super::sliding::unit_at;
 use crate::effect::{DeclaredTorque, Place};
 use crate::error::{Error, Result};
+use std::sync::Arc;
 
 /// A cause that adds torque at joints, with its numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,10 +111,13 @@ const SIGN_WIDTH: &str = "recording.sign_width";
 impl TorqueTerm {
     /// Its form. Fails where no cause has its name or its numbers are too few.
     pub(super) fn form(&self) -> Result<TorqueForm> {
-        let mut causes = TORQUE_CAUSES
-            .into_iter()
-            .chain(self.declared.as_ref().map(declared));
-        let cause = causes.find(|cause| cause.name == self.effect && cause.has_shape(&self.shape));
+        let fits = |cause: &&TorqueCause| cause.name == self.effect && cause.has_shape(&self.shape);
+        let law = self.declared.as_ref();
+        let law = law.filter(|law| law.declaration().name == self.effect);
+        let cause = match law {
+            Some(_) => Some(&DECLARED),
+            None => TORQUE_CAUSES.into_iter().find(fits),
+        };
         let cause = cause.ok_or_else(|| {
             Error::data(
                 "torque model",
@@ -121,6 +126,7 @@ impl TorqueTerm {
         })?;
         Ok(TorqueForm {
             cause,
+            law: law.cloned().map(Arc::new),
             place: self.place,
             with: self.with,
             shape: self.shape.clone(),
@@ -159,7 +165,7 @@ impl TorqueModel {
             let coefficients = form.coefficient_names().into_iter();
             names.extend(coefficients.map(|(name, unit)| named(&name, unit)));
             let spans = form.shape_numbers().into_iter();
-            shapes.extend(spans.map(|span| named(span.name, span.unit)));
+            shapes.extend(spans.map(|span| named(&span.name, span.unit)));
         }
         names.extend(shapes);
         names.push((SIGN_WIDTH.into(), "rad/s"));
@@ -268,7 +274,7 @@ impl TorqueModel {
     pub fn friction_line(&self, joint: usize) -> Result<Option<[FittedNumber; 2]>> {
         let places = self.places()?;
         let laws = self.laws(&places, joint);
-        let of_name = |name: &str| laws.iter().find(|law| law.form.cause.name == name);
+        let of_name = |name: &str| laws.iter().find(|law| law.form.name() == name);
         let exponent = |law: &FrictionLaw| law.form.shape.first().copied();
         let power = of_name(VISCOUS).map(|law| (law, exponent(law).unwrap_or(1.0)));
         let Some((power, exponent)) = power.filter(|(_, exponent)| *exponent != 1.0) else {

@@ -1,7 +1,7 @@
 //! The answer to a diagnosis of torques, from what was solved.
 
 use super::arm::{INERTIAL_NAMES, INERTIAL_NUMBERS, inertial_unit};
-use super::cause::{FittedNumber, UNKNOWN, plain};
+use super::cause::{COULOMB, FittedNumber, LOAD_FRICTION, UNKNOWN, VISCOUS, plain};
 use super::cells::CauseChoice;
 use super::enforce::with_bodies;
 use super::findings::{FittedSet, contact, plain_finding, sigma_of};
@@ -15,10 +15,12 @@ use super::types::{
     TorqueFinding, TorqueLeftover, TorqueNoise, TorqueQuestion,
 };
 use super::weighted::{JointNoise, NoiseMemory};
+use crate::criteria::torque::NAMED;
 use crate::diagnose::{Probabilities, VerdictKind};
 use crate::effect::Place;
 use crate::error::counted;
 use crate::statistics::quantile;
+use calib_numerics::figures::significant;
 
 /// Times the noise beyond which held-out rows are not explained.
 const UNEXPLAINED: f64 = 1.5;
@@ -95,7 +97,7 @@ pub(super) fn outcome(
         after,
         held_out: !held.is_empty(),
         findings: found,
-        not_observable: not_observable(&fit),
+        not_observable: not_observable(&fit, &solved.silent),
         leftover,
         events: problem.events.clone(),
         courses: courses(problem, &first, &last),
@@ -137,21 +139,21 @@ fn filters_remark(problem: &TorqueProblem) -> String {
 /// A finding whose name is not to be given is without one at its place, and so are its rivals.
 fn nameless(finding: &mut TorqueFinding, without: &[String]) {
     let is_left_out = |effect: &str| without.iter().any(|name| name == effect);
-    if is_left_out(finding.effect) {
-        finding.effect = UNKNOWN;
+    if is_left_out(&finding.effect) {
+        finding.effect = UNKNOWN.into();
         finding.statement = format!("something without a name acts at {}", finding.place);
     }
-    let here = (finding.effect, finding.place);
+    let here = (finding.effect.clone(), finding.place);
     for rival in finding
         .rivals
         .iter_mut()
-        .filter(|rival| is_left_out(rival.effect))
+        .filter(|rival| is_left_out(&rival.effect))
     {
-        rival.effect = UNKNOWN;
+        rival.effect = UNKNOWN.into();
     }
     let probabilities = &mut finding.probabilities;
     finding.rivals.retain(|rival| {
-        let is_same = (rival.effect, rival.place) == here;
+        let is_same = (&rival.effect, rival.place) == (&here.0, here.1);
         if is_same {
             let Probabilities { name, place, none } = *probabilities;
             *probabilities = Probabilities::new(name + rival.probability, place, none);
@@ -309,8 +311,8 @@ const SMALL_RANGE: f64 = 0.2;
 /// A coefficient whose standard deviation is above this share of the joint's largest torque is not seen.
 const UNSEEN: f64 = 0.5;
 
-/// Sentences on a set's problem.
-fn not_observable(fit: &FittedSet) -> Vec<String> {
+/// Sentences on a set's problem; what is silent in it is too small to be told.
+fn not_observable(fit: &FittedSet, silent: &[usize]) -> Vec<String> {
     let choice = fit.choice;
     let scene = &choice.problem.scene;
     let mut sentences = Vec::new();
@@ -341,11 +343,55 @@ fn not_observable(fit: &FittedSet) -> Vec<String> {
             sentences.push(format!(
                 "{} {}: these motions do not show it",
                 form.place,
-                form.cause.name.replace('_', " ")
+                form.name().replace('_', " ")
             ));
+        }
+        let mut silent = silent.iter();
+        let silent = silent.find(|one| choice.form(**one).is_called_as(form));
+        let is_curve = choice.has(fit.set, |other| {
+            other.place == form.place && other.is_nameless_curve()
+        });
+        let may_hide = FRICTIONS.contains(&form.name()) && form.is_plain() && !is_curve;
+        if may_hide && (!found || silent.is_some()) {
+            sentences.extend(hidden_friction(fit, *silent.unwrap_or(&number)));
         }
     }
     sentences
+}
+
+/// Frictions of which is told how much of them the noise would hide.
+const FRICTIONS: [&str; 3] = [VISCOUS, COULOMB, LOAD_FRICTION];
+/// Share of the joint's largest torque that may be hidden without a word.
+const HIDDEN: f64 = 0.03;
+
+/// How much of a friction that is not named these rows would not show, where that is more than a little.
+fn hidden_friction(fit: &FittedSet, number: usize) -> Option<String> {
+    let (problem, form) = (fit.choice.problem, fit.choice.form(number));
+    let place = problem.all.of(number).start;
+    let column = &problem.all.columns[place];
+    let size = largest(column.courses.iter().flatten());
+    let measured = (column.joints.iter()).map(|joint| problem.torque_at(*joint, problem.latency));
+    let torque = measured.fold(0.0, |most, course| f64::max(most, largest(&course)));
+    let sigma = match fit.set.contains(&number) {
+        true => fit.sweep.sigma(place),
+        false => fit.sweep.with(&[number]).sigma(place),
+    };
+    let most = *NAMED * sigma;
+    let (_, unit) = form.coefficient_names().swap_remove(0);
+    let most_of_it = match unit {
+        "1" => format!("{} % of the load", significant(1e2 * most, 2)),
+        unit => {
+            let unit = unit_at(form.slides(&problem.scene.arm.prismatic), unit);
+            format!("{} {unit}", significant(most, 2))
+        }
+    };
+    (most > 0.0 && most * size > HIDDEN * torque).then(|| {
+        format!(
+            "{} {}: not seen; up to {most_of_it} would be hidden by the noise",
+            form.place,
+            form.name().replace('_', " ")
+        )
+    })
 }
 
 /// Speeds below and above which a tenth of the moving rows are.

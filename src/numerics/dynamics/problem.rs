@@ -18,6 +18,7 @@ use crate::criteria::torque::MISLED;
 use crate::effect::{DeclaredTorque, Place};
 use crate::statistics::nearest;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// s around an event whose rows do not count either.
 const EVENT_MARGIN: f64 = 0.3;
@@ -70,7 +71,7 @@ pub(super) struct TorqueProblem<'a> {
     /// did not confirm them.
     pub(crate) barred: Vec<TorqueForm>,
     /// Laws of a user's own.
-    own: Vec<DeclaredTorque>,
+    own: Vec<Arc<DeclaredTorque>>,
     /// ln by which causes without a name are more probable than usual.
     pub(crate) openness: f64,
     /// Whether the width of a sign has changed since columns of forms outside a set were made.
@@ -120,7 +121,7 @@ impl<'a> TorqueProblem<'a> {
             events: Vec::new(),
             noise: Vec::new(),
             barred: Vec::new(),
-            own: question.effects.clone(),
+            own: question.effects.iter().cloned().map(Arc::new).collect(),
             openness: log_odds(question.open_world) - log_odds(*USUAL),
             is_stale: false,
             temperature: temperature.filter(|[least, most]| least <= most),
@@ -145,16 +146,19 @@ impl<'a> TorqueProblem<'a> {
     /// Forms the columns: of the base, and of all forms of all causes.
     pub(crate) fn form(&mut self) {
         self.form_base();
-        let (nameless, mut causes): (Vec<_>, Vec<&'static TorqueCause>) = TORQUE_CAUSES
+        let (nameless, causes): (Vec<&'static TorqueCause>, Vec<_>) = TORQUE_CAUSES
             .iter()
             .partition(|cause| cause.name == UNKNOWN);
-        causes.extend(self.own.iter().map(declared));
-        causes.extend(nameless);
-        for cause in causes {
-            for form in (cause.forms)(cause, &self.scene) {
-                if !form.needs_turn(&self.scene.arm.prismatic) {
-                    self.push(form);
-                }
+        let scene = &self.scene;
+        let forms = |cause: &'static TorqueCause| (cause.forms)(cause, scene);
+        let named = causes.into_iter().flat_map(forms);
+        let own = self.own.iter().flat_map(|law| declared(law, scene));
+        let all: Vec<TorqueForm> = (named.chain(own))
+            .chain(nameless.into_iter().flat_map(forms))
+            .collect();
+        for form in all {
+            if !form.needs_turn(&self.scene.arm.prismatic) {
+                self.push(form);
             }
         }
         self.all.listed = self.all.forms.len();
@@ -181,11 +185,11 @@ impl<'a> TorqueProblem<'a> {
     fn renew(
         &mut self,
         forms: impl IntoIterator<Item = usize>,
-        is_concerned: fn(&TorqueCause) -> bool,
+        is_concerned: fn(&TorqueForm) -> bool,
     ) {
         for number in forms {
             let form = &self.all.forms[number];
-            if is_concerned(form.cause) {
+            if is_concerned(form) {
                 let fresh = self.columns_of(form);
                 self.all.replace(number, &fresh);
             }
@@ -194,14 +198,14 @@ impl<'a> TorqueProblem<'a> {
 
     /// Makes columns of a set of the sign of a velocity anew, after its width has changed; those of others wait.
     pub(crate) fn renew_signs(&mut self, set: &[usize]) {
-        self.renew(set.iter().copied(), |cause| cause.of_sign);
+        self.renew(set.iter().copied(), |form| form.cause.of_sign);
         self.is_stale = true;
     }
 
     /// Makes the columns that wait anew.
     pub(crate) fn refresh(&mut self) {
         if std::mem::take(&mut self.is_stale) {
-            self.renew(0..self.all.listed, |cause| cause.of_sign);
+            self.renew(0..self.all.listed, |form| form.cause.of_sign);
         }
     }
 
@@ -254,7 +258,7 @@ impl<'a> TorqueProblem<'a> {
         for form in &mut self.all.forms {
             of_greatest_load(form, &self.scene);
         }
-        self.renew(0..self.all.forms.len(), |cause| cause.of_rigid);
+        self.renew(0..self.all.forms.len(), TorqueForm::is_of_rigid);
     }
 
     /// Coefficients of a form in a solution.
@@ -543,7 +547,7 @@ pub(super) fn basic_forms(problem: &TorqueProblem) -> Vec<usize> {
     let forms = &problem.all.forms;
     let is_basic = |form: &usize| {
         let form = &forms[*form];
-        form.width == 1 && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&form.cause.name)
+        form.width == 1 && [VISCOUS, COULOMB, OFFSET, ROTOR].contains(&form.name())
     };
     (0..problem.all.listed).filter(is_basic).collect()
 }

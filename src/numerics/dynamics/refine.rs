@@ -39,7 +39,7 @@ fn refine_at(
     let form = &problem.all.forms[set[place]];
     for span in (form.cause.spans)(form) {
         for half in HALVES {
-            try_grid(problem, weighted, set, place, span, half);
+            try_grid(problem, weighted, set, place, &span, half);
             // What the coarsest grid leaves as it usually is stays so.
             if span.usual == Some(problem.all.forms[set[place]].shape[span.index]) {
                 break;
@@ -58,7 +58,7 @@ pub(super) fn list_own_shapes(problem: &mut TorqueProblem, mut weighted: Weighte
     let forms = problem.all.forms[..listed].to_vec();
     let is_own = |form: &usize| {
         let form = &forms[*form];
-        form.cause.declared.is_some() && !form.shape.is_empty()
+        form.law.is_some() && !form.shape.is_empty()
     };
     let own: Vec<usize> = (0..listed).filter(is_own).collect();
     let (mut set, mut found) = (basic_forms(problem), Vec::new());
@@ -89,7 +89,7 @@ fn try_grid(
     weighted: &mut WeightedColumns,
     set: &mut [usize],
     place: usize,
-    span: ShapeSpan,
+    span: &ShapeSpan,
     half: f64,
 ) {
     let form = problem.all.forms[set[place]].clone();

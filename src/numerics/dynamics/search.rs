@@ -131,7 +131,7 @@ impl TorqueTable<'_, '_> {
             shape: cell.forms.iter().position(here).unwrap_or_default(),
             cell: Cell {
                 key,
-                cause: Cause::named(cell.name),
+                cause: Cause::named(cell.name.clone()),
                 place: cell.place.to_string(),
                 log_prior: cell.log_prior,
                 // Which forms it has, and what each weighs, the table knows.
@@ -238,7 +238,7 @@ fn options() -> Options {
 /// explains as much.
 pub(super) fn from_common(choice: &CauseChoice) -> Vec<usize> {
     let table = TorqueTable::new(choice);
-    let is_drive = |form: &TorqueForm| form.cause.name == TORQUE_CONSTANT;
+    let is_drive = |form: &TorqueForm| form.name() == TORQUE_CONSTANT;
     let has_masses = |fit: &TorqueFit| {
         choice.has(&forms(&fit.components), |form| {
             form.cause.inertial && !is_drive(form)

@@ -202,7 +202,7 @@ fn too_small(
 fn explained_by(problem: &TorqueProblem, set: &[usize]) -> String {
     let names = set.iter().map(|number| {
         let form = &problem.all.forms[*number];
-        format!("{} {}", form.cause.name, form.place)
+        format!("{} {}", form.name(), form.place)
     });
     format!("explained by {}", names.collect::<Vec<_>>().join(", "))
 }
@@ -282,7 +282,7 @@ fn unconfirmed(choice: &CauseChoice, set: &[usize], priors: &[(usize, f64)]) -> 
     let (mut set, mut leave) = (set.to_vec(), Vec::new());
     loop {
         let asked = set.iter().copied();
-        let asked = asked.filter(|form| choice.form(*form).cause.name == UNKNOWN);
+        let asked = asked.filter(|form| choice.form(*form).name() == UNKNOWN);
         let short = asked.map(|form| (form, short(choice, &folds, &set, form)));
         let worst = short.filter(|(_, short)| *short < 0.0);
         let Some((worst, _)) = worst.min_by(|a, b| a.1.total_cmp(&b.1)) else {

@@ -4,6 +4,7 @@ use super::cause::TorqueParameter;
 use super::model::{FrictionCurve, TorqueModel};
 use crate::diagnose::{Evidence, Probabilities, RivalCause, VerdictKind};
 use crate::effect::{DeclaredTorque, Place};
+use std::borrow::Cow;
 
 /// How a recording of torques is to be diagnosed.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,7 +74,7 @@ pub struct TorqueErrors {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TorqueFinding {
     /// Canonical name of the cause.
-    pub effect: &'static str,
+    pub effect: Cow<'static, str>,
     /// Where it acts.
     pub place: Place,
     /// The kind of variable that it follows: own speed, own angle, other angle, load, acceleration, time, temperature, constant.

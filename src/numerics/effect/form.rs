@@ -248,8 +248,9 @@ impl Form {
     }
 
     /// The name of its cause.
-    pub fn name(&self) -> &'static str {
-        self.cause().name()
+    pub fn name(&self) -> &str {
+        let declared = self.declared();
+        declared.map_or_else(|| self.cause().name(), |form| form.declaration().name())
     }
 
     /// Its coefficients as parameters: `cause.place.number`.
@@ -312,6 +313,7 @@ impl Form {
         let instrument = || self.place() == Place::Tracker;
         self.cause().of_the_measurement
             || (self.cause().is_nameless() && (passing() || instrument()))
+            || (self.declared().is_some() && instrument())
     }
 }
 
@@ -327,7 +329,7 @@ impl Serialize for Form {
         {
             body.insert(WITHIN.into(), serde_json::json!(self.within));
         }
-        BTreeMap::from([(self.cause().name(), body)]).serialize(serializer)
+        BTreeMap::from([(self.name(), body)]).serialize(serializer)
     }
 }
 
@@ -355,7 +357,7 @@ impl<'de> Deserialize<'de> for Form {
 }
 
 impl Effect for Form {
-    fn name(&self) -> &'static str {
+    fn name(&self) -> &str {
         Self::name(self)
     }
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec> {

@@ -157,7 +157,7 @@ impl<'a> ArmState<'a> {
 /// A physical cause of pose error.
 pub trait Effect: Send + Sync {
     /// Canonical name, e.g. `reduction_ratio`.
-    fn name(&self) -> &'static str;
+    fn name(&self) -> &str;
     /// The parameters, in the order of `p` in [`Effect::deflect`].
     fn parameters(&self, robot: &RobotModel) -> Vec<ParameterSpec>;
     /// Adds the motions that parameters `p` (SI) cause in this state, with their partials.

@@ -78,11 +78,8 @@ pub struct Summary<'a> {
 impl<'a> Summary<'a> {
     /// The cause of a name: of one of the forms, or of the library.
     pub fn cause(&self, name: &str) -> Option<&'static Cause> {
-        self.forms
-            .iter()
-            .map(|form| form.cause())
-            .find(|declared| declared.name() == name)
-            .or_else(|| cause(name))
+        let form = self.forms.iter().find(|form| form.name() == name);
+        form.map(|form| form.cause()).or_else(|| cause(name))
     }
 
     /// The forms under a cause's name, each with its fitted numbers.
@@ -164,7 +161,7 @@ pub struct FittedForms<'a> {
     /// Fitted rows, ascending.
     pub rows: &'a [usize],
     /// What the finding is called.
-    pub called: &'static str,
+    pub called: &'a str,
     /// What makes it up.
     pub forms: &'a [Form],
 }

@@ -9,6 +9,8 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+use std::borrow::Cow;
+
 mod evidence;
 pub mod linear;
 mod rows;
@@ -22,10 +24,10 @@ pub use rows::{Block, Rows, ranked};
 pub use search::{Answer, Options, diagnose, dropped, findings};
 
 /// A cause: a row of the table.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
-    /// In tables and JSON.
-    pub name: &'static str,
+    /// In tables and JSON; a user's own causes have names of their own.
+    pub name: Cow<'static, str>,
     /// The kind of variable that it follows: own speed, load, time ..; empty where each cell has its own.
     pub follows: &'static str,
     /// What it does at a place `{}`, for a person.
@@ -38,7 +40,7 @@ pub struct Cause {
 
 impl Cause {
     /// One of which a problem says all but the name itself.
-    pub const fn named(name: &'static str) -> Self {
+    pub const fn named(name: Cow<'static, str>) -> Self {
         Self {
             name,
             follows: "",

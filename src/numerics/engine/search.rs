@@ -210,7 +210,7 @@ fn search<P: Problem>(
         let (tried, independence) = trials(problem, &stand.fit, &set, asked, least, near);
         let now = problem.log_evidence(&stand.fit, independence);
         for trial in tried.iter().take(4) {
-            let (name, place) = (trial.cell.cause.name, &trial.cell.place);
+            let (name, place) = (&trial.cell.cause.name, &trial.cell.place);
             tell(format!(
                 "  {name} at {place}: ln odds {:.1}",
                 trial.log - now
@@ -297,7 +297,7 @@ enum Until {
 
 impl<P: Problem> Change<P> {
     fn of(trial: Trial<P>, gone: &str) -> Self {
-        let (name, place) = (trial.cell.cause.name, trial.cell.place);
+        let (name, place) = (&trial.cell.cause.name, &trial.cell.place);
         Self {
             said: format!("{name} at {place} in place of {gone}"),
             fit: trial.fit,
@@ -501,7 +501,7 @@ mod tests {
     fn cell(key: usize) -> Accepted<usize> {
         let cell = Cell {
             key,
-            cause: Cause::named(["first", "second"][key]),
+            cause: Cause::named(["first", "second"][key].into()),
             place: "here".into(),
             log_prior: 0.0,
             shapes: Vec::new(),

@@ -117,6 +117,11 @@ families! {
         let time = draw.uniform(0.03, 0.08);
         Law::backlash(on.joint, on.scale() * draw.uniform(0.06, 0.15), time, other)
     };
+    alone "backlash" {
+        let scale = on.with_friction(true)?;
+        let grease = if other { draw.uniform(0.2, 0.5) } else { 0.0 };
+        Law::play(on.joint, draw.size(0.003, 0.02), scale * draw.uniform(0.3, 0.8), on.width, grease)
+    };
     alone "contact" {
         let start = draw.uniform(2.0, on.touched - 4.0);
         let reach = matrix::norm(matrix::minus(on.machine.tool, on.machine.points[0])).max(0.3);

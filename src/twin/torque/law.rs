@@ -135,6 +135,13 @@ laws! { |now, past|
     /// Nm after each reversal, and its time, s; in another form half a wave.
     Backlash backlash "backlash_spikes" at joint { joint: usize, size: f64, time: f64, wave: bool } other wave
         => size * past.knock(now.v(joint), time, wave, now.step);
+    /// Play behind the drive, rad: a link whose own friction (Nm) holds it stands while the drive crosses the play after a reversal, and neither
+    /// its load nor that friction is felt so long. A load above the friction keeps the gear on its flank. In another form the last part of the
+    /// play is crossed against grease.
+    Play play "backlash" at joint { joint: usize, play: f64, size: f64, width: f64, grease: f64 } other grease != 0.0 => {
+        let felt = past.felt(now.rigid[joint], size, now.v(joint) * now.step / play, grease);
+        felt * (now.rigid[joint] + size * sign(now.v(joint), width)) - now.rigid[joint]
+    };
     /// N at the tool between two times, s: half a wave, in another form a push that is held.
     Contact contact "contact" at "arm" { start: f64, end: f64, force: [f64; 3], held: bool } other held;
     /// kg more on the tool, centre off by m.
@@ -174,6 +181,8 @@ pub(super) struct Past {
     swing: [f64; 2],
     direction: f64,
     since: f64,
+    /// Where the drive is in the play, from 0 at one flank to 1 at the other.
+    across: f64,
 }
 
 /// A moment of the recording, before latency.
@@ -218,6 +227,25 @@ impl Past {
         let dx = dx + step * ddx;
         self.swing = [x + step * dx, dx];
         self.swing[0] - drive
+    }
+
+    /// Share of a link's load that its drive feels after a move in parts of the play.
+    fn felt(&mut self, load: f64, friction: f64, moved: f64, grease: f64) -> f64 {
+        if load.abs() > friction {
+            self.across = if load > 0.0 { 1.0 } else { 0.0 };
+            return 1.0;
+        }
+        self.across = (self.across + moved).clamp(0.0, 1.0);
+        let left = match moved > 0.0 {
+            true => 1.0 - self.across,
+            false => self.across,
+        };
+        match left {
+            0.0 => 1.0,
+            left if left < grease => 1.0 - left / grease,
+            _ if moved == 0.0 && [0.0, 1.0].contains(&self.across) => 1.0,
+            _ => 0.0,
+        }
     }
 
     /// What a knock of unit height after each reversal is at present.

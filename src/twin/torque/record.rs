@@ -298,6 +298,11 @@ impl TorqueCase {
         self.with(Law::stribeck(joint, size, speed, Fall::Exponential(1.0)))
     }
 
+    /// The same arm with play (rad) at a joint (from 0) behind which friction (Nm) holds the link.
+    pub fn with_play(self, joint: usize, play: f64, friction: f64) -> Self {
+        self.with(Law::play(joint, play, friction, 0.008, 0.0))
+    }
+
     /// The same arm with so much more Coulomb friction at a joint (from 0), Nm.
     pub fn with_drag(self, joint: usize, size: f64) -> Self {
         self.with(Law::coulomb(joint, size, 0.008))

@@ -43,9 +43,9 @@ fn a_holder_that_turns_about_the_flange_is_one_step_with_two_names() {
         starts_with(statements[0], &size);
         has(statements[0], "from row 71");
         let found = &diagnosis.findings[0];
-        let rivals = found.rivals.iter().map(|rival| (rival.effect, rival.place));
+        let rivals = (found.rivals.iter()).map(|rival| (&*rival.effect, rival.place));
         let mut names: Vec<(&str, Place)> = rivals.collect();
-        names.push((found.effect, found.place));
+        names.push((&found.effect, found.place));
         for name in [
             ("zero_shift", Place::Joint(joints - 1)),
             ("tool_shift", Place::Tool),

@@ -41,7 +41,7 @@ fn lagging(poses: usize, others: impl Fn(f64, f64) -> f64) -> (Cell, Measurement
 
 fn lag_alone(diagnosis: &Diagnosis, what: &str) -> (String, f64) {
     let findings = &diagnosis.findings;
-    let named: Vec<&str> = findings.iter().map(|finding| finding.effect).collect();
+    let named: Vec<&str> = findings.iter().map(|finding| &*finding.effect).collect();
     assert_eq!(named, ["joint_log_lag"], "{what}: {}", diagnosis.statement);
     let found = &findings[0];
     (found.statement.clone(), found.parameters[0].value)

@@ -181,6 +181,56 @@ fn an_mjcf_of_torques_holds_friction_and_drives() {
 }
 
 #[test]
+fn an_mjcf_of_ones_own_gets_friction_and_keeps_all_else() {
+    let case = arm();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path().join("case");
+    write(&here, &case.recording());
+    let joint = |number: usize| {
+        let more = ["", " damping=\"0.5\" frictionloss=\"9\""][number % 2];
+        format!("<body><joint name=\"J{number}\" axis=\"0 1 0\"{more}/><geom size=\"0.05\"/>")
+    };
+    let bodies: String = (1..=6).map(joint).collect();
+    let own = format!(
+        "<mujoco model=\"mine\">\n<!-- mine -->\n<worldbody>{bodies}{}</worldbody>\n<actuator><motor joint=\"J1\"/></actuator>\n</mujoco>\n",
+        "</body>".repeat(6)
+    );
+    write(&here, &[("mine.xml", own.clone())]);
+    let text = answer::read(root("pipelines/dynamics/pipeline.yaml"));
+    let named = text.replace("robot.json\"", "robot.json\", mjcf: \"${case}/mine.xml\"");
+    assert_ne!(text, named);
+    write(folder.path(), &[("p.yaml", named)]);
+    let set = format!("case={}", here.display());
+    let pipeline = folder.path().join("p.yaml");
+    let words = format!("run --quiet --set {set} {}", pipeline.display());
+    calib(&words, &folder.path().join("store")).code(0);
+    let solved = Solved { folder, case };
+    let text = exported(&solved, "mjcf");
+    let file = roxmltree::Document::parse(&text).unwrap();
+    has(&text, "a copy of mine.xml");
+    has(&text, "<!-- mine -->");
+    let of = |name: &'static str| {
+        file.descendants()
+            .filter(move |node| node.has_tag_name(name))
+    };
+    assert_eq!((of("geom").count(), of("motor").count()), (6, 1));
+    for (element, truth) in of("joint").zip(solved.case.plain_friction()) {
+        for (attribute, size) in ["damping", "frictionloss"].iter().zip(truth) {
+            let written = element.attribute(*attribute).unwrap();
+            near(number(&element, attribute), size.unwrap(), 0.3, attribute);
+            let digits = written.chars().filter(char::is_ascii_digit).count();
+            assert!(digits < 7, "more digits than its sigma tells: {written}");
+        }
+    }
+    let other = own.replace("\"J3\"", "\"K3\"");
+    write(&solved.path("case"), &[("mine.xml", other)]);
+    let refused = calib("export HEAD --format mjcf", &solved.path("store"));
+    assert_ne!(refused.code, Some(0));
+    has(&refused.err, "mine.xml");
+    has(&refused.err, "has no joint `J3`");
+}
+
+#[test]
 fn files_say_nothing_of_friction_that_was_not_found() {
     // Friction at two joints alone: none at the others is found, and 0 would be a statement that nobody made.
     let plain = arm().plain_friction();

@@ -19,6 +19,7 @@ use crate::regression::FormRegression;
 use crate::round::{EstimatedCause, FitState, RoundView};
 use crate::types::{ClosedForm, Finding};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 mod grammar;
 
@@ -31,7 +32,7 @@ pub(super) struct FormulaSearch<'a, 'b> {
 
 /// A formula with its shape numbers where they fit best.
 struct Candidate {
-    cause: &'static DeclaredCause,
+    cause: Arc<DeclaredCause>,
     form: Form,
     price: usize,
 }
@@ -52,7 +53,7 @@ impl FormulaSearch<'_, '_> {
         // What it has elsewhere are details of the model.
         let forms = finding.forms.iter();
         let forms: Vec<&Form> = forms.filter(|form| form.place() == finding.place).collect();
-        let is_named = ![names::UNKNOWN, names::JOINT_TABLE].contains(&finding.effect);
+        let is_named = ![names::UNKNOWN, names::JOINT_TABLE].contains(&&*finding.effect);
         if is_named || forms.is_empty() || !forms.iter().all(|form| nameless(form)) {
             return None;
         }
@@ -150,11 +151,11 @@ impl FormulaSearch<'_, '_> {
     /// A declared law at the place of the finding, its shape numbers where they fit best.
     fn candidate(
         &self,
-        cause: &'static DeclaredCause,
+        cause: Arc<DeclaredCause>,
         place: Place,
         given: &FormRegression,
     ) -> Option<Candidate> {
-        let forms = DeclaredForm::hypotheses(cause, self.survey).into_iter();
+        let forms = DeclaredForm::hypotheses(&cause, self.survey).into_iter();
         let forms = forms.map(|hypothesis| hypothesis.form);
         let forms: Vec<Form> = forms.filter(|form| form.place() == place).collect();
         let with_gains = |forms: Vec<Form>| given.gains(&forms).into_iter().zip(forms);
@@ -166,9 +167,9 @@ impl FormulaSearch<'_, '_> {
         let ends = ends.map(|(_, form)| given.refined(form, self.survey));
         let (_, form) = with_gains(ends.collect()).max_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(Candidate {
+            price: cause.price(),
             cause,
             form,
-            price: cause.price(),
         })
     }
 

@@ -13,12 +13,13 @@ use crate::diagnose::types::{
 };
 use crate::effect::{Basis, Clock, Form, Place, Term, Variable, names};
 use calib_engine::log_sum;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 /// One finding of a search.
 #[derive(Clone)]
 pub(crate) struct FoundCell {
-    pub(crate) effect: &'static str,
+    pub(crate) effect: Cow<'static, str>,
     pub(crate) place: Place,
     /// Positions of its forms among the causes of the model.
     pub(crate) members: Vec<usize>,
@@ -66,24 +67,24 @@ pub(crate) struct Answer {
 
 impl CauseTable<'_, '_> {
     /// The name of a component.
-    fn name_of(&self, component: &Component) -> &'static str {
+    fn name_of(&self, component: &Component) -> Cow<'static, str> {
         let cell = &self.cells[component.cell];
         let is_table = |form: &Form| form.term().is_some_and(Term::is_own_table);
         if cell.name == names::JOINT_COMPLIANCE && component.shape.is_bent {
-            self.bent
+            self.bent.into()
         } else if self.may_be_table(cell) && component.forms.iter().all(is_table) {
-            names::JOINT_TABLE
+            names::JOINT_TABLE.into()
         } else {
-            cell.name
+            cell.name.clone()
         }
     }
 
     /// The name of a cell, whatever its shape.
-    fn name_of_cell(&self, cell: &CauseCell) -> &'static str {
+    fn name_of_cell(&self, cell: &CauseCell) -> Cow<'static, str> {
         if self.may_be_table(cell) && cell.free().is_some_and(FreeShape::is_own_table) {
-            names::JOINT_TABLE
+            names::JOINT_TABLE.into()
         } else {
-            cell.name
+            cell.name.clone()
         }
     }
 
@@ -96,13 +97,16 @@ impl CauseTable<'_, '_> {
 
     /// Components by name and place. A joint's curve over its own angle that is smaller than the unnamed components of that joint is grouped with
     /// them.
-    fn by_name(&self, components: &[Component]) -> BTreeMap<(&'static str, Place), Vec<usize>> {
-        let mut groups: BTreeMap<(&'static str, Place), Vec<usize>> = BTreeMap::new();
+    fn by_name(
+        &self,
+        components: &[Component],
+    ) -> BTreeMap<(Cow<'static, str>, Place), Vec<usize>> {
+        let mut groups: BTreeMap<(Cow<'static, str>, Place), Vec<usize>> = BTreeMap::new();
         for (i, component) in components.iter().enumerate() {
             let cell = &self.cells[component.cell];
             let name = match self.name_of(component) {
-                names::JOINT_TABLE => names::JOINT_TABLE,
-                _ => cell.name,
+                table if table == names::JOINT_TABLE => table,
+                _ => cell.name.clone(),
             };
             groups.entry((name, cell.place)).or_default().push(i);
         }
@@ -115,10 +119,12 @@ impl CauseTable<'_, '_> {
             .filter(|(name, _)| *name == names::JOINT_TABLE);
         let tables: Vec<Place> = tables.map(|(_, place)| *place).collect();
         for place in tables {
-            let unnamed = groups.get(&(names::UNKNOWN, place)).map_or(0.0, square);
-            if square(&groups[&(names::JOINT_TABLE, place)]) < unnamed {
-                let members = groups.remove(&(names::JOINT_TABLE, place));
-                let all = groups.entry((names::UNKNOWN, place)).or_default();
+            let unnamed = groups
+                .get(&(names::UNKNOWN.into(), place))
+                .map_or(0.0, square);
+            if square(&groups[&(names::JOINT_TABLE.into(), place)]) < unnamed {
+                let members = groups.remove(&(names::JOINT_TABLE.into(), place));
+                let all = groups.entry((names::UNKNOWN.into(), place)).or_default();
                 all.extend(members.into_iter().flatten());
                 all.sort_unstable();
             }
@@ -138,7 +144,7 @@ impl CauseTable<'_, '_> {
         }
         let (mut found, mut better) = (Vec::new(), None);
         for ((name, _), members) in self.by_name(components) {
-            let (mut one, instead) = self.found(components, (name, &members), state.kappa);
+            let (mut one, instead) = self.found(components, (&name, &members), state.kappa);
             one.members = members.iter().flat_map(|i| ranges[*i].clone()).collect();
             found.push(one);
             better = better.or(instead.map(|instead| (members, instead)));
@@ -168,7 +174,7 @@ impl CauseTable<'_, '_> {
     fn found(
         &self,
         components: &[Component],
-        (name, members): (&'static str, &[usize]),
+        (name, members): (&Cow<'static, str>, &[usize]),
         kappa: f64,
     ) -> (FoundCell, Option<(usize, CellEvidence)>) {
         let mut known = without(components, members);
@@ -203,10 +209,10 @@ impl CauseTable<'_, '_> {
         let better = better.and_then(|best| Some((best, scan.closely.get(&best)?.clone())));
         let place = self.cells[cell].place;
         let effect = match self.name_of(component) {
-            names::JOINT_TABLE => name,
+            table if table == names::JOINT_TABLE => name.clone(),
             other => other,
         };
-        let (probabilities, rivals) = self.weigh((effect, place), component, &scan);
+        let (probabilities, rivals) = self.weigh((&effect, place), component, &scan);
         let bounds = members.iter().flat_map(|i| {
             let one = &components[*i];
             std::iter::repeat_n((one.positive, one.largest), one.forms.len())
@@ -230,12 +236,12 @@ impl CauseTable<'_, '_> {
     /// Probabilities of a name and a place, and the rivals, by the odds of every cell and of nothing.
     fn weigh(
         &self,
-        (effect, place): (&'static str, Place),
+        (effect, place): (&Cow<'static, str>, Place),
         component: &Component,
         scan: &CellScan,
     ) -> (Probabilities, Vec<RivalCause>) {
         let whole = log_of_all(scan);
-        let mut shares: BTreeMap<(&'static str, Place), f64> = BTreeMap::new();
+        let mut shares: BTreeMap<(Cow<'static, str>, Place), f64> = BTreeMap::new();
         for (k, cell) in self.cells.iter().enumerate() {
             let probability = (scan.log_odds[k] - whole).exp();
             if probability < 1e-6 {
@@ -254,11 +260,12 @@ impl CauseTable<'_, '_> {
                 false => bent,
             };
             if cell.name == names::JOINT_COMPLIANCE {
-                *shares.entry((self.bent, cell.place)).or_default() += bent * probability;
-                *shares.entry((cell.name, cell.place)).or_default() += (1.0 - bent) * probability;
+                *shares.entry((self.bent.into(), cell.place)).or_default() += bent * probability;
+                *shares.entry((cell.name.clone(), cell.place)).or_default() +=
+                    (1.0 - bent) * probability;
             } else {
                 let name = if k == component.cell {
-                    effect
+                    effect.clone()
                 } else {
                     self.name_of_cell(cell)
                 };
@@ -266,15 +273,15 @@ impl CauseTable<'_, '_> {
             }
         }
         let sound = 1.0 - *MISLED;
-        let name = sound * shares.get(&(effect, place)).copied().unwrap_or(0.0);
+        let name = sound * shares.get(&(effect.clone(), place)).copied().unwrap_or(0.0);
         let here = shares.iter().filter(|(key, _)| key.1 == place);
         let at_place = sound * here.map(|(_, share)| share).sum::<f64>();
-        let is_rival = |(key, share): &(&(&'static str, Place), &f64)| {
-            **key != (effect, place) && **share > *RIVAL
-        };
-        let rivals = shares.iter().filter(is_rival);
-        let rival = |((other, at), share): (&(&'static str, Place), &f64)| RivalCause {
-            effect: other,
+        let rivals = shares.iter().filter(|(key, share)| {
+            let (other, at) = key;
+            (other, *at) != (effect, place) && **share > *RIVAL
+        });
+        let rival = |((other, at), share): (&(Cow<'static, str>, Place), &f64)| RivalCause {
+            effect: other.clone(),
             place: *at,
             delta_bic: 2.0 * (name.max(1e-12) / (sound * share)).ln(),
             probability: sound * share,
@@ -311,7 +318,7 @@ impl CauseTable<'_, '_> {
                     follows,
                     explains,
                     delta_bic,
-                    effect: cell.name,
+                    effect: cell.name.clone(),
                 };
                 let at = cells.entry((cell.place, follows)).or_insert(new.clone());
                 if new.delta_bic > at.delta_bic {
@@ -330,7 +337,7 @@ impl CauseTable<'_, '_> {
                         share,
                         parameters,
                         delta_bic,
-                        effect: cell.name,
+                        effect: cell.name.clone(),
                     };
                     let at = best.entry((by, name)).or_insert(new.clone());
                     if new.delta_bic > at.delta_bic {
@@ -401,7 +408,7 @@ fn join_tables(found: &mut Vec<FoundCell>) {
             let Probabilities { name, none, .. } = one.probabilities;
             let mut rivals = one.rivals.iter();
             let curve =
-                rivals.find(|rival| (rival.effect, rival.place) == (names::JOINT_TABLE, place));
+                rivals.find(|rival| rival.effect == names::JOINT_TABLE && rival.place == place);
             one.place == place
                 && one.effect == names::GEAR_CYCLIC
                 && curve.is_some_and(|curve| curve.probability > name + none)

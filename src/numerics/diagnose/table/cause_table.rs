@@ -92,7 +92,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
         }
         frame.prepare(&motions, &variables);
         frame.tabulate(terms.iter().map(|term| term.law()));
-        let is_declared = |cell: &CauseCell| cell.is_named() && cause(cell.name).is_none();
+        let is_declared = |cell: &CauseCell| cell.is_named() && cause(&cell.name).is_none();
         let declared = (0..named.len()).filter(|cell| is_declared(&named[*cell]));
         let excludes = |name: &str| question.without.iter().any(|out| out == name);
         let mut table = Self {

@@ -7,12 +7,13 @@ use crate::effect::{
     Basis, Form, Law, Motion, Place, Polar, Survey, Term, Unknown, Variable, is_own_table, names,
 };
 use nalgebra::Vector3;
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 /// A cause at a place, whatever its shape.
 pub(super) struct CauseCell {
     /// Canonical name of the cause, `unknown` of a cell without a name.
-    pub(crate) name: &'static str,
+    pub(crate) name: Cow<'static, str>,
     pub(crate) place: Place,
     /// What tells it from other cells of the recording.
     pub(crate) key: String,

@@ -228,7 +228,7 @@ pub(super) fn cell(free: FreeShape, log_prior: f64, survey: &Survey) -> CauseCel
         motion => format!("{motion:?}"),
     };
     CauseCell {
-        name: names::UNKNOWN,
+        name: names::UNKNOWN.into(),
         place: free.motion.place(),
         key: format!("{motion} by {}{times}{step}", named(free.variable)),
         log_prior,

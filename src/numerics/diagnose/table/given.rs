@@ -15,6 +15,7 @@ use crate::diagnose::round::{EstimatedCause, RoundView};
 use crate::effect::{Basis, Form, Place, Term, names};
 use calib_engine::{AMPLITUDES, log_sum, log_sums};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A cell that is taken to be in the robot.
@@ -38,7 +39,7 @@ pub struct CellAnswer {
     /// Key of one shape of it; none of all its shapes together.
     pub shape: Option<String>,
     /// Canonical name of its cause.
-    pub effect: &'static str,
+    pub effect: Cow<'static, str>,
     /// Where it acts.
     pub place: Place,
     /// Kind of variable.
@@ -194,7 +195,7 @@ impl CauseTable<'_, '_> {
                 left_out: left_out.map(Into::into),
                 cell: cell.key.clone(),
                 shape: None,
-                effect: cell.name,
+                effect: cell.name.clone(),
                 place: cell.place,
                 follows,
                 log: log_sum(&logs),

@@ -15,6 +15,7 @@ use crate::effect::{
     Unknown, Variable, cause, names,
 };
 use crate::robot::RobotModel;
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Causes that most arms have; all others of the list are rare.
@@ -66,7 +67,7 @@ pub(super) fn cells(
         prior_weight,
         ..
     } = *question;
-    let mut all: BTreeMap<(&'static str, Place), Vec<Hypothesis>> = BTreeMap::new();
+    let mut all: BTreeMap<(Cow<'static, str>, Place), Vec<Hypothesis>> = BTreeMap::new();
     // What is a cell of its own without a name, or no cell at all.
     let other = [
         names::UNKNOWN,
@@ -82,31 +83,36 @@ pub(super) fn cells(
             .flat_map(|cause| DeclaredForm::hypotheses(cause, survey)),
     );
     for hypothesis in proposed {
-        let key = (cell_of(hypothesis.form.name()), hypothesis.form.place());
+        let name = cell_of(hypothesis.form.name()).to_string();
+        let key = (name.into(), hypothesis.form.place());
         all.entry(key).or_default().push(hypothesis);
     }
     for joint in survey.revolute() {
         let pulled = hoses(survey, joint);
         if !pulled.is_empty() {
-            all.entry((names::CABLE_DRAG, Place::Joint(joint)))
+            all.entry((names::CABLE_DRAG.into(), Place::Joint(joint)))
                 .or_default()
                 .extend(pulled);
         }
     }
-    let cell = |((name, place), hypotheses): ((&'static str, Place), Vec<Hypothesis>)| {
+    let cell = |((name, place), hypotheses): ((Cow<'static, str>, Place), Vec<Hypothesis>)| {
         let unusual = unusual(&hypotheses);
         let mut groups = weighed(hypotheses, survey.robot);
-        groups.extend(curves(name, place, &groups, values, survey.joints()));
-        let is_named = !without.iter().any(|out| out == name);
+        groups.extend(curves(&name, place, &groups, values, survey.joints()));
+        let is_named = !without.iter().any(|out| *out == name);
         CauseCell {
-            name: if is_named { name } else { names::UNKNOWN },
-            place,
             key: format!("{name}@{place}"),
             log_prior: if is_named {
-                log_prior(name, place, prior_weight) - prior_weight * unusual
+                log_prior(&name, place, prior_weight) - prior_weight * unusual
             } else {
                 generated::prior_odds(question).ln()
             },
+            name: if is_named {
+                name
+            } else {
+                names::UNKNOWN.into()
+            },
+            place,
             shapes: Shapes::Listed(groups),
             between: None,
         }

@@ -171,7 +171,7 @@ impl CauseTable<'_, '_> {
         let cell = &self.cells[component.cell];
         Accepted {
             cell: Cell {
-                cause: Cause::named(cell.name),
+                cause: Cause::named(cell.name.clone()),
                 place: cell.place.to_string(),
                 log_prior: cell.log_prior,
                 shapes: Vec::new(),

@@ -15,6 +15,7 @@ use crate::verdict::not_observable::{faults, rows_apart};
 use crate::verdict::windup::turns_back;
 use crate::whitened::add_columns;
 use crate::words::{left_out, not_so, sentence, small, with_size};
+use std::borrow::Cow;
 
 /// The causes of the last round as findings, largest at the tool first; whether they leave more than noise `at_fitted_rows` or anywhere.
 pub(super) fn findings(
@@ -74,7 +75,7 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
         let unclear_main = out
             .iter()
             .position(|(_, main, _)| main.place == found.place && unclear(main));
-        let is_curve = [names::UNKNOWN, names::JOINT_TABLE].contains(&found.effect);
+        let is_curve = [names::UNKNOWN, names::JOINT_TABLE].contains(&&*found.effect);
         let first = is_curve.then(|| {
             let mut mains = out.iter();
             let here =
@@ -96,9 +97,9 @@ fn without_details(last: &LastRound, something_left: bool) -> Vec<(FoundCell, Ve
 /// Every cause is searched once. A second step of the same cause (a tool that was taken off twice) is therefore found as unknown, with that cause
 /// as its likeliest rival: it gets the name of the cause.
 pub(super) fn name_repeated_steps(all: &mut [FoundCell]) {
-    let named: Vec<(&'static str, Place)> = all
+    let named: Vec<(Cow<'static, str>, Place)> = all
         .iter()
-        .map(|found| (found.effect, found.place))
+        .map(|found| (found.effect.clone(), found.place))
         .filter(|(effect, _)| *effect != names::UNKNOWN)
         .collect();
     for found in all.iter_mut().filter(|one| one.effect == names::UNKNOWN) {
@@ -107,14 +108,14 @@ pub(super) fn name_repeated_steps(all: &mut [FoundCell]) {
         let Some((k, rival)) = likeliest else {
             continue;
         };
-        let steps = cause(rival.effect).is_some_and(Cause::is_a_step);
-        let again = steps && named.contains(&(rival.effect, rival.place));
+        let steps = cause(&rival.effect).is_some_and(Cause::is_a_step);
+        let again = steps && named.contains(&(rival.effect.clone(), rival.place));
         let Probabilities { name, none, .. } = found.probabilities;
         if !again || rival.probability <= name + none {
             continue;
         }
         let unnamed = RivalCause {
-            effect: found.effect,
+            effect: found.effect.clone(),
             place: found.place,
             probability: name,
             ..rival.clone()
@@ -129,26 +130,32 @@ pub(super) fn name_repeated_steps(all: &mut [FoundCell]) {
 fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
     let state = &last.state;
     let FoundCell {
-        effect,
         place,
+        ref effect,
         ref members,
         ..
     } = *found;
+    let effect = effect.clone();
     let form = |i: &usize| state.causes[*i].form.clone();
     let mut forms: Vec<Form> = members.iter().map(form).collect();
     let mut rivals = found.rivals.clone();
     let mut probabilities = found.probabilities;
-    probabilities.name =
-        share_with_identities(effect, &forms, last.survey, probabilities.name, &mut rivals);
-    let modelled = modelled(last, effect, &forms);
+    probabilities.name = share_with_identities(
+        &effect,
+        &forms,
+        last.survey,
+        probabilities.name,
+        &mut rivals,
+    );
+    let modelled = modelled(last, &effect, &forms);
     if let Some((effect, place)) = modelled.as_ref().map(|modelled| modelled.same)
         && !rivals
             .iter()
-            .any(|rival| (rival.effect, rival.place) == (effect, place))
+            .any(|rival| rival.effect == effect && rival.place == place)
     {
         probabilities.name /= 2.0;
         rivals.push(RivalCause {
-            effect,
+            effect: effect.into(),
             place,
             delta_bic: 0.0,
             probability: probabilities.name,
@@ -167,7 +174,7 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
         effect_rms,
         gain: found.gain,
     };
-    let parameters = parameters(last, effect, members);
+    let parameters = parameters(last, &effect, members);
     let clock = Clock::of(last.survey.data);
     let summary = Summary {
         place,
@@ -182,13 +189,16 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
         .iter()
         .any(|form| !form.cause().is_nameless() && last.excludes(form.name()));
     let (effect, statement) = match (impossible, modelled) {
-        _ if !named && excluded => (names::UNKNOWN, left_out(&summary, &rms)),
-        (Some(why), _) if named => (names::UNKNOWN, not_so(effect, &summary, &why, &rms)),
+        _ if !named && excluded => (names::UNKNOWN.into(), left_out(&summary, &rms)),
+        (Some(why), _) if named => (names::UNKNOWN.into(), not_so(&effect, &summary, &why, &rms)),
         (_, Some(modelled)) => (effect, with_size(&modelled.sentence, &rms)),
-        _ => (effect, sentence(effect, &summary, &rms)),
+        _ => {
+            let said = sentence(&effect, &summary, &rms);
+            (effect, said)
+        }
     };
     rivals.retain(|rival| {
-        !last.excludes(rival.effect) && (rival.effect, rival.place) != (effect, place)
+        !last.excludes(&rival.effect) && (&rival.effect, rival.place) != (&effect, place)
     });
     let valid = valid(&forms, last);
     forms.extend(details.iter().map(form));
@@ -206,7 +216,7 @@ fn finding(last: &LastRound, found: &FoundCell, details: &[usize]) -> Finding {
 }
 
 /// What a finding is in the fitted model as a whole, unless the user excludes what would do the same.
-fn modelled(last: &LastRound, called: &'static str, forms: &[Form]) -> Option<ModelledFinding> {
+fn modelled(last: &LastRound, called: &str, forms: &[Form]) -> Option<ModelledFinding> {
     let state = &last.state;
     let Model {
         robot, stack, x, ..
@@ -346,7 +356,7 @@ pub(super) fn share_with_identities(
     same.dedup();
     let same = same.into_iter().map(|same| (same, *IDENTITY));
     for ((effect, place), share) in moved.chain(same) {
-        let is_same = |rival: &&mut RivalCause| (rival.effect, rival.place) == (effect, place);
+        let is_same = |rival: &&mut RivalCause| rival.effect == effect && rival.place == place;
         let known = rivals.iter_mut().find(is_same);
         // Of one motion that is of two places neither is the usual one.
         let is_motion = [effect, called] == [names::UNKNOWN; 2];
@@ -359,7 +369,7 @@ pub(super) fn share_with_identities(
             }
         } else {
             rivals.push(RivalCause {
-                effect,
+                effect: effect.into(),
                 place,
                 delta_bic: 0.0,
                 probability: share * left,

@@ -2,7 +2,7 @@
 
 use crate::criteria::screen::{BULK, MISTAKES};
 use crate::criteria::words::{FAULT, STILL};
-use crate::effect::{Clock, DeclaredCause, DeclaredForm, Measure, Survey, cause, names};
+use crate::effect::{Clock, DeclaredCause, DeclaredForm, Survey, cause, names};
 use crate::error::counted;
 use crate::estimate::{Screening, Suspect, SuspectKind};
 use crate::observation::{Dimension, noise, only_contacts};
@@ -10,6 +10,7 @@ use crate::robot::Measurements;
 use crate::types::{Finding, RivalCause};
 use crate::verdict::findings::LastRound;
 use crate::words::small;
+use std::sync::Arc;
 
 /// What these data cannot show, whatever the truth; `reach` is the largest motion of the point by each joint, m/rad.
 pub(super) fn not_observable(survey: &Survey, reach: &[f64]) -> Vec<String> {
@@ -88,8 +89,8 @@ fn closing(data: &Measurements, rows: &[usize]) -> f64 {
 }
 
 /// Effects of the user's own that were not tried, since the recording lacks a column.
-pub(super) fn not_tried(survey: &Survey, causes: &[&'static DeclaredCause]) -> Vec<String> {
-    let one = |declared: &&'static DeclaredCause| {
+pub(super) fn not_tried(survey: &Survey, causes: &[Arc<DeclaredCause>]) -> Vec<String> {
+    let one = |declared: &Arc<DeclaredCause>| {
         let lacking = DeclaredForm::lacking(declared, survey)?;
         Some(format!(
             "{}: the recording has no {lacking}",
@@ -130,22 +131,22 @@ const ONE_MOTION: &str = "both are one motion, which no poses tell apart: look a
 
 /// Whether a rival is another place of a finding's motion.
 fn is_one_motion(finding: &Finding, rival: &RivalCause) -> bool {
-    [finding.effect, rival.effect] == [names::UNKNOWN; 2] && rival.delta_bic == 0.0
+    [&finding.effect, &rival.effect] == [names::UNKNOWN; 2] && rival.delta_bic == 0.0
 }
 
 /// What would tell findings from their rivals, a sentence each.
-pub(super) fn next(findings: &[Finding], causes: &[&'static DeclaredCause]) -> Vec<String> {
+pub(super) fn next(findings: &[Finding], causes: &[Arc<DeclaredCause>]) -> Vec<String> {
     let mut out = Vec::new();
     let measure = |name: &str| {
         let mut declared = causes.iter().filter(|declared| declared.name() == name);
         match declared.next() {
-            Some(declared) => declared.about().measure,
-            None => cause(name)?.measure,
+            Some(declared) => declared.measure(),
+            None => of_library(name),
         }
     };
     for finding in findings {
         for rival in finding.rivals.iter().take(2) {
-            let names = [finding.effect, rival.effect];
+            let names = [&*finding.effect, &*rival.effect];
             let how = match is_one_motion(finding, rival) {
                 true => ONE_MOTION,
                 false => least(names.into_iter().filter_map(measure)).unwrap_or(POSES),
@@ -161,13 +162,18 @@ pub(super) fn next(findings: &[Finding], causes: &[&'static DeclaredCause]) -> V
 
 /// What is not a pose and may tell two effects apart, where there is such a thing.
 pub fn other_means(a: &str, b: &str) -> Option<&'static str> {
-    least([a, b].into_iter().filter_map(|name| cause(name)?.measure))
+    least([a, b].into_iter().filter_map(of_library))
 }
 
-fn least(measures: impl Iterator<Item = Measure>) -> Option<&'static str> {
-    measures
-        .min_by_key(|measure| measure.rank)
-        .map(|measure| measure.advice)
+/// Rank and advice of a measurement that separates a cause of the library from others.
+fn of_library(name: &str) -> Option<(u8, &'static str)> {
+    let measure = cause(name)?.measure?;
+    Some((measure.rank, measure.advice))
+}
+
+fn least<'a>(measures: impl Iterator<Item = (u8, &'a str)>) -> Option<&'a str> {
+    let first = measures.min_by_key(|(rank, _)| *rank);
+    first.map(|(_, advice)| advice)
 }
 
 /// Joints and points of all rows that are so many rows apart.
@@ -250,7 +256,7 @@ pub(super) fn faults(
 }
 
 /// A fault of the recording; without its name where that is not to be given.
-fn of_the_recording(effect: &'static str, statement: String, last: &LastRound) -> Finding {
+fn of_the_recording(effect: &str, statement: String, last: &LastRound) -> Finding {
     let effect = match last.excludes(effect) {
         true => names::UNKNOWN,
         false => effect,

@@ -15,6 +15,9 @@ pub const COULOMB: &str = "coulomb_friction";
 /// Its name.
 pub(crate) const VISCOUS: &str = "viscous_friction";
 
+/// Its name.
+pub(crate) const LOAD_FRICTION: &str = "load_friction";
+
 /// Friction that grows with the velocity of a joint. Shape: its exponent, 1 but where the data show another: grease that thins with speed.
 pub(crate) static VISCOUS_FRICTION: TorqueCause = TorqueCause {
     name: VISCOUS,
@@ -158,7 +161,7 @@ pub(super) static STRIBECK: TorqueCause = TorqueCause {
             usual: Some(1.0),
             ..span("exponent", "1", [0.4, 2.5])
         };
-        vec![speed, exponent, speed]
+        vec![speed.clone(), exponent, speed]
     },
     torque: ColumnTorque::Friction(|form, _, velocity, sign| sign * falls(form, velocity)),
     statement: |form, fitted, unit| {
@@ -195,7 +198,7 @@ const LOAD_SHAPE: usize = 2;
 /// lose another share of it than one that its load drives. Shape: the power of the load that friction grows with, and the greatest load, Nm,
 /// of which shares are; tables of linear friction alone have none.
 pub(super) static LOAD: TorqueCause = TorqueCause {
-    name: "load_friction",
+    name: LOAD_FRICTION,
     follows: |_| "load",
     coefficients: &[("share", "1"), ("share_driven_back", "1")],
     of_sign: true,

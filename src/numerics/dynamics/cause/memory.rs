@@ -1,9 +1,10 @@
 //! Torques that remember rows before: what turns over after a travel, knocks after a reversal, swings.
 
 use super::{
-    ColumnTorque, PLAIN, ShapeSpan, TorqueCause, angle::UNKNOWN, at_each_joint, friction::COULOMB,
-    plain, shape, span,
+    ColumnTorque, PLAIN, ShapeSpan, TorqueCause, TorqueForm, angle::UNKNOWN, at_each_joint,
+    friction::COULOMB, plain, shape, span,
 };
+use crate::recording::largest;
 use std::f64::consts::PI;
 
 /// rad: the travel that stands in the rich model, and all that are tried.
@@ -164,6 +165,88 @@ pub(super) static SPIKES: TorqueCause = TorqueCause {
     ..PLAIN
 };
 
+/// rad, and friction of the link over its greatest load: all that are tried.
+const PLAYS: [f64; 4] = [0.002, 0.005, 0.01, 0.02];
+const HELD: [f64; 3] = [0.3, 0.8, 2.5];
+/// Share of what is not felt, within errors of the load and of the friction.
+const UNFELT: [f64; 2] = [0.4, 1.6];
+
+/// Play of a gear: a link that its own friction holds stands while the motor crosses the play after a reversal, and neither its load nor that
+/// friction is felt so long. A load above the friction keeps the gear on its flank. Shape: the play, and the friction.
+pub(super) static PLAY: TorqueCause = TorqueCause {
+    name: "backlash",
+    follows: |_| "own speed",
+    coefficients: &[("share", "1")],
+    price: |_| 25.0,
+    of_rigid: true,
+    of_sign: true,
+    modifies: &[COULOMB],
+    positive: true,
+    forms: |cause, scene| {
+        let of_joint = |joint: usize| {
+            let most = largest(&scene.rigid[joint]).max(f64::MIN_POSITIVE);
+            let shape = |play: f64| HELD.map(|share| [play, share * most]);
+            let shapes: Vec<[f64; 2]> = PLAYS.into_iter().flat_map(shape).collect();
+            let form = move |shape: [f64; 2]| TorqueForm::at_joint(cause, joint, 1).shaped(&shape);
+            shapes.into_iter().map(form)
+        };
+        (0..scene.joints()).flat_map(of_joint).collect()
+    },
+    is_possible: |_, values| (UNFELT[0]..=UNFELT[1]).contains(&values[0]),
+    spans: |form| {
+        let friction = form.shape[1];
+        let held = ShapeSpan {
+            index: 1,
+            ..span("friction", "Nm", [0.1 * friction, 10.0 * friction])
+        };
+        vec![span("play", "rad", [1e-3, 0.06]), held]
+    },
+    torque: ColumnTorque::Course(|column, out| {
+        let &[play, friction] = &column.form.shape[..] else {
+            return;
+        };
+        let rigid = &column.scene.rigid[column.form.joint()];
+        for stretch in &column.scene.stretches {
+            let mut across: f64 = 0.5;
+            for row in stretch.clone() {
+                let (load, velocity) = (rigid[row], column.velocity(row));
+                if load.abs() > friction {
+                    across = if load > 0.0 { 1.0 } else { 0.0 };
+                    continue;
+                }
+                let before = across;
+                let moved = velocity / column.scene.rate / play;
+                across = (across + moved).clamp(0.0, 1.0);
+                // Of the row in which the other flank is reached, the part before.
+                let share = match moved == 0.0 {
+                    true if across == 0.0 || across == 1.0 => 0.0,
+                    true => 1.0,
+                    false => ((across - before) / moved).abs(),
+                };
+                out[row] = -share * (load + friction * column.direction(row));
+            }
+        }
+    }),
+    parameters: |form, fitted| {
+        let unfelt = form.shape[1] * fitted[0].value;
+        vec![
+            shape("play", form.shape[0], "rad"),
+            shape("friction", unfelt, "Nm"),
+        ]
+    },
+    statement: |form, fitted, unit| {
+        format!(
+            "{} has a play of {:.2e} {}: after each reversal neither its load nor {:.2} {} of friction behind the play is felt until it is crossed",
+            form.place,
+            form.shape[0],
+            unit("rad"),
+            form.shape[1] * fitted[0].value,
+            unit("Nm")
+        )
+    },
+    ..PLAIN
+};
+
 /// The second coefficient over the first, at most: twice the greatest z.
 const TRANSMITTED: f64 = 1.2;
 /// Least share of the rigid arm's torque that swings: all of it does, and at resonances (Hz) beyond what was filtered only the ratio of the
@@ -199,7 +282,7 @@ pub(super) static ELASTICITY: TorqueCause = TorqueCause {
             index: 1,
             ..span("damping", "1", [0.005, 0.6])
         };
-        vec![hertz, damping, hertz]
+        vec![hertz.clone(), damping, hertz]
     },
     torque: ColumnTorque::Course(|column, out| {
         let (scene, form) = (column.scene, column.form);

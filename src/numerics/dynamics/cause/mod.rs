@@ -18,12 +18,14 @@ use crate::criteria::torque::AT_END;
 use crate::effect::{DeclaredTorque, Place};
 pub(super) use angle::{CURRENT_OFFSET, OFFSET, UNKNOWN};
 use calib_numerics::figures::measured;
-pub(super) use declared::declared;
+pub(super) use declared::{DECLARED, declared};
 pub use friction::COULOMB;
 pub(super) use friction::{
-    COULOMB_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power, of_greatest_load,
+    COULOMB_FRICTION, LOAD_FRICTION, VISCOUS, VISCOUS_FRICTION, line_of_power, of_greatest_load,
 };
 pub(super) use masses::{ADDED_MASS, CENTRE, PAYLOAD, ROTOR, TORQUE_CONSTANT, masses_on_links};
+use std::borrow::Cow;
+use std::sync::Arc;
 
 /// A fitted number of a finding.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +41,7 @@ pub struct TorqueParameter {
 }
 
 /// All causes with columns; latency and contacts are looked for before. What has no name comes last.
-pub(super) static TORQUE_CAUSES: [&TorqueCause; 29] = [
+pub(super) static TORQUE_CAUSES: [&TorqueCause; 30] = [
     &friction::VISCOUS_FRICTION,
     &friction::COULOMB_FRICTION,
     &angle::CURRENT_OFFSET,
@@ -56,6 +58,7 @@ pub(super) static TORQUE_CAUSES: [&TorqueCause; 29] = [
     &angle::RIPPLE,
     &memory::ELASTICITY,
     &memory::SPIKES,
+    &memory::PLAY,
     &friction::WRIST_COUPLING,
     &masses::PAYLOAD,
     &masses::LINK_MASS,
@@ -77,10 +80,10 @@ pub fn is_cause(name: &str) -> bool {
 }
 
 /// A shape number that is refined.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct ShapeSpan {
     /// As the cause's parameters call it.
-    pub(crate) name: &'static str,
+    pub(crate) name: Cow<'static, str>,
     pub(crate) unit: &'static str,
     /// Position in the form's shape.
     pub(crate) index: usize,
@@ -121,12 +124,10 @@ pub(super) fn slope(size: f64, function: impl Fn(f64) -> f64) -> f64 {
 
 /// A physical reason why measured torques differ from those of the rigid arm.
 pub(super) struct TorqueCause {
-    /// Canonical.
+    /// Canonical; none of declared laws, which have names of their own.
     pub(crate) name: &'static str,
     /// The kind of variable that it follows.
     pub(crate) follows: fn(&TorqueForm) -> &'static str,
-    /// The law that a user has declared; none of a cause of the library.
-    pub(crate) declared: Option<&'static DeclaredTorque>,
     /// What its coefficients are called in a model, and their units; wrong masses, which are in the inertial numbers, have none.
     pub(crate) coefficients: &'static [CoefficientName],
     /// -2 ln of the prior odds of a form of it, relative to a common one.
@@ -226,7 +227,6 @@ impl ColumnOf<'_> {
 const PLAIN: TorqueCause = TorqueCause {
     name: "",
     follows: |_| "",
-    declared: None,
     coefficients: &[],
     price: |_| 6.0,
     modifies: &[],
@@ -265,9 +265,7 @@ impl TorqueCause {
 fn plain_parameters(form: &TorqueForm, fitted: &[FittedNumber]) -> Vec<TorqueParameter> {
     let coefficients = form.cause.coefficients.iter().zip(fitted);
     let coefficients = coefficients.map(|((name, unit), number)| plain(name, *number, unit));
-    let shapes = form.shape_numbers().into_iter();
-    let shapes = shapes.map(|span| shape(span.name, form.shape[span.index], span.unit));
-    coefficients.chain(shapes).collect()
+    coefficients.chain(form.shape_parameters()).collect()
 }
 
 /// Quantity and unit of a coefficient.
@@ -309,6 +307,8 @@ impl FittedNumber {
 #[derive(Clone)]
 pub(super) struct TorqueForm {
     pub(crate) cause: &'static TorqueCause,
+    /// The law that a user has declared; none of a cause of the library.
+    pub(crate) law: Option<Arc<DeclaredTorque>>,
     pub(crate) place: Place,
     /// Further joints (from 0) or an order, as the cause reads them.
     pub(crate) with: [usize; 2],
@@ -322,6 +322,7 @@ impl TorqueForm {
     pub(crate) fn at_joint(cause: &'static TorqueCause, joint: usize, width: usize) -> Self {
         Self {
             cause,
+            law: None,
             place: Place::Joint(joint),
             with: [0; 2],
             shape: Vec::new(),
@@ -333,6 +334,24 @@ impl TorqueForm {
     pub(crate) fn shaped(mut self, shape: &[f64]) -> Self {
         self.shape = shape.to_vec();
         self
+    }
+
+    /// The name of its cause.
+    pub(crate) fn name(&self) -> &str {
+        let law = self.law.as_ref();
+        law.map_or(self.cause.name, |law| &law.declaration().name)
+    }
+
+    /// Whether its coefficients can only be positive.
+    pub(crate) fn is_positive(&self) -> bool {
+        let law = self.law.as_ref();
+        law.map_or(self.cause.positive, |law| law.declaration().positive)
+    }
+
+    /// Whether its columns are made of the rigid torque.
+    pub(crate) fn is_of_rigid(&self) -> bool {
+        let law = self.law.as_ref();
+        law.map_or(self.cause.of_rigid, |law| law.asks_load())
     }
 
     /// Its joint, from 0; that of its link elsewhere.
@@ -443,12 +462,12 @@ impl TorqueForm {
 
     /// Whether it is a cause of a name at a place.
     pub(crate) fn is_called(&self, name: &str, place: Place) -> bool {
-        self.cause.name == name && self.place == place
+        self.name() == name && self.place == place
     }
 
     /// Whether both are the same cause at the same place.
     pub(crate) fn is_called_as(&self, other: &Self) -> bool {
-        self.is_called(other.cause.name, other.place)
+        self.is_called(other.name(), other.place)
     }
 
     /// What it is a function of, among those that have no name: what its first coefficient is called.
@@ -474,6 +493,17 @@ impl TorqueForm {
         numbers
     }
 
+    /// Whether it is its cause in the usual shape, with one coefficient.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.width == 1 && self.shape_numbers().is_empty()
+    }
+
+    /// Shape numbers that are found, as people read them.
+    pub(crate) fn shape_parameters(&self) -> impl Iterator<Item = TorqueParameter> + '_ {
+        let found = self.shape_numbers().into_iter();
+        found.map(|span| shape(&span.name, self.shape[span.index], span.unit))
+    }
+
     /// The same with a shape number moved.
     pub(crate) fn with_shape(&self, index: usize, value: f64) -> Self {
         let mut moved = self.clone();
@@ -484,9 +514,11 @@ impl TorqueForm {
     /// What its coefficients are called, one a column, with their units.
     pub(crate) fn coefficient_names(&self) -> Vec<(String, &'static str)> {
         let known = self.cause.coefficients;
+        let unit = self.law.as_ref().map_or("1", |_| "Nm");
         let name = |column: usize| match known.get(column) {
             Some((quantity, unit)) => ((*quantity).to_string(), *unit),
-            None => (format!("coefficient_{}", column + 1), "1"),
+            None if self.width == 1 => ("coefficient".to_string(), unit),
+            None => (format!("coefficient_{}", column + 1), unit),
         };
         (0..self.width).map(name).collect()
     }
@@ -608,7 +640,7 @@ const LITTLE: f64 = 0.2;
 /// A shape number that is refined by ratios between two ends.
 fn span(name: &'static str, unit: &'static str, [least, most]: [f64; 2]) -> ShapeSpan {
     ShapeSpan {
-        name,
+        name: name.into(),
         unit,
         index: 0,
         least,

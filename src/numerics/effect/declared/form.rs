@@ -3,100 +3,59 @@
 
 use super::declaration::{EffectDeclaration, ShapeRange};
 use super::formula::Formula;
-use super::pattern::{DeclarationFault, DeclaredPattern, Seat, combinations};
+use super::pattern::{DeclarationFault, DeclaredPattern, combinations};
 use super::quantity::RowQuantity;
 use crate::effect::sentence::filled;
 use crate::effect::summary::unit;
 use crate::effect::{
-    ArmState, Cause, Deflection, Form, Hypothesis, Measure, Motion, NumberSpec, OwnMotion, Place,
-    Placed, Summary, Survey, Variable, figure,
+    ArmState, Cause, Deflection, Form, Hypothesis, Motion, NumberSpec, OwnMotion, Place, Placed,
+    Summary, Survey, Variable, figure,
 };
 use crate::robot::{Measurements, RobotModel};
 use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Arc;
 
-/// A declared effect as a cause next to those of the library. Causes live as long as the program, as those of the library do: each declaration
-/// is kept once, by its content.
+/// A declared effect as a cause next to those of the library.
 pub struct DeclaredCause {
-    about: &'static Cause,
     declaration: EffectDeclaration,
     pattern: DeclaredPattern,
 }
 
-/// Every declaration so far, by its content.
-static KEPT: Mutex<BTreeMap<String, &'static DeclaredCause>> = Mutex::new(BTreeMap::new());
+/// The row of every declared effect in the table of causes: what differs is asked of the declaration, which each form has with it.
+static DECLARED: Cause = Cause {
+    motion: Some(OwnMotion {
+        propose: |_| Vec::new(),
+        sentence: Some(sentence),
+        read: undeclared,
+    }),
+    ..Cause::PLAIN
+};
 
 /// What a declaration advises is asked for after what the library knows of its own causes.
 const RANK: u8 = 9;
 
 impl DeclaredCause {
     /// The cause that is declared. Fails with everything that is wrong with it.
-    pub fn of(declaration: &EffectDeclaration) -> Result<&'static Self, Vec<DeclarationFault>> {
+    pub fn of(declaration: &EffectDeclaration) -> Result<Arc<Self>, Vec<DeclarationFault>> {
         let pattern = DeclaredPattern::of(declaration)?;
-        let content = serde_json::to_string(declaration).expect("numbers and texts serialise");
-        let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-        Ok(kept
-            .entry(content)
-            .or_insert_with(|| Box::leak(Box::new(Self::new(declaration.clone(), pattern)))))
-    }
-
-    fn new(declaration: EffectDeclaration, pattern: DeclaredPattern) -> Self {
-        let kept = |text: String| -> &'static str { Box::leak(text.into_boxed_str()) };
-        let stated = |text: &Option<String>, otherwise: &str| {
-            kept(text.clone().unwrap_or_else(|| otherwise.into()))
-        };
-        let columns: BTreeSet<&str> = pattern
-            .laws
-            .iter()
-            .flat_map(|law| law.quantities())
-            .filter_map(|quantity| quantity.needs())
-            .collect();
-        let columns: Vec<&str> = columns.into_iter().collect();
-        let needs = if columns.is_empty() {
-            "-".to_string()
-        } else {
-            columns.join(", ")
-        };
-        let size = match (declaration.size, &declaration.unit) {
-            (Some(size), Some(unit)) => format!("{size} {unit}"),
-            (Some(size), None) => size.to_string(),
-            (None, _) => "any".into(),
-        };
-        Self {
-            about: Box::leak(Box::new(Cause {
-                name: kept(declaration.name.clone()),
-                place: kept(declaration.place.clone()),
-                formula: kept(declaration.law.0.join("; ")),
-                size: kept(size),
-                confounded: stated(&declaration.confounded, "-"),
-                needs: stated(&declaration.needs, &needs),
-                of_the_measurement: pattern.seat == Seat::Fixed(Place::Tracker),
-                measure: declaration.advice.clone().map(|advice| Measure {
-                    rank: RANK,
-                    advice: kept(advice),
-                }),
-                motion: Some(OwnMotion {
-                    propose: |_| Vec::new(),
-                    sentence: Some(sentence),
-                    read: undeclared,
-                }),
-                ..Cause::PLAIN
-            })),
-            declaration,
+        Ok(Arc::new(Self {
+            declaration: declaration.clone(),
             pattern,
-        }
-    }
-
-    /// Its row of the table of causes.
-    pub fn about(&self) -> &'static Cause {
-        self.about
+        }))
     }
 
     /// Its name.
-    pub fn name(&self) -> &'static str {
-        self.about.name
+    pub fn name(&self) -> &str {
+        &self.declaration.name
+    }
+
+    /// What to measure that separates it from other causes, as the user says, with its rank.
+    pub fn measure(&self) -> Option<(u8, &str)> {
+        self.declaration
+            .advice
+            .as_deref()
+            .map(|advice| (RANK, advice))
     }
 
     /// What the user wrote.
@@ -151,11 +110,11 @@ fn sentence(summary: &Summary) -> String {
     let text = match &cause.declaration.sentence {
         Some(sentence) => filled(sentence, &known),
         None => {
-            let laws = cause.about.formula;
+            let laws = cause.declaration.law.0.join("; ");
             format!(
                 "{} errs as {} says, {laws}: {}",
                 summary.place,
-                cause.about.name,
+                cause.name(),
                 known("values")
             )
         }
@@ -179,7 +138,7 @@ fn undeclared(_: &serde_json::Value) -> serde_json::Result<Form> {
 /// The laws of a declaration at one place.
 #[derive(Clone)]
 pub struct DeclaredForm {
-    cause: &'static DeclaredCause,
+    cause: Arc<DeclaredCause>,
     motion: Motion,
     shape: Vec<f64>,
 }
@@ -194,7 +153,7 @@ struct KeptForm {
 
 impl DeclaredForm {
     /// Every hypothesis of a declaration that the recording can speak of.
-    pub fn hypotheses(cause: &'static DeclaredCause, survey: &Survey) -> Vec<Hypothesis> {
+    pub fn hypotheses(cause: &Arc<DeclaredCause>, survey: &Survey) -> Vec<Hypothesis> {
         if Self::lacking(cause, survey).is_some() {
             return Vec::new();
         }
@@ -209,7 +168,7 @@ impl DeclaredForm {
         for motion in pattern.motions(survey) {
             for shape in &starts {
                 let form = Self {
-                    cause,
+                    cause: cause.clone(),
                     motion,
                     shape: shape.clone(),
                 };
@@ -283,8 +242,8 @@ impl DeclaredForm {
     }
 
     /// Its cause, as it was declared.
-    pub fn declaration(&self) -> &'static DeclaredCause {
-        self.cause
+    pub fn declaration(&self) -> &Arc<DeclaredCause> {
+        &self.cause
     }
 
     fn quantities(&self) -> Vec<RowQuantity> {
@@ -325,11 +284,9 @@ impl DeclaredForm {
     }
 
     fn with(&self, shape: Vec<f64>) -> Form {
-        let Self { cause, motion, .. } = *self;
         Form::from(Self {
-            cause,
-            motion,
             shape,
+            ..self.clone()
         })
     }
 
@@ -358,7 +315,7 @@ const RATIO: f64 = 1.7;
 
 impl PartialEq for DeclaredForm {
     fn eq(&self, other: &Self) -> bool {
-        std::ptr::eq(self.cause, other.cause)
+        self.cause.declaration == other.cause.declaration
             && self.motion == other.motion
             && self.shape == other.shape
     }
@@ -366,7 +323,7 @@ impl PartialEq for DeclaredForm {
 
 impl Placed for DeclaredForm {
     fn cause(&self) -> &'static Cause {
-        self.cause.about()
+        &DECLARED
     }
 
     fn place(&self) -> Place {

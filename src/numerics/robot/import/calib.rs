@@ -194,6 +194,9 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
         .iter()
         .map(|joint| joint.body.as_ref().and_then(|body| body.inertia))
         .collect();
+    let points = joints.iter().map(|joint| joint.point);
+    let points = points.map(Vector3::from);
+    let points: Vec<_> = points.chain([tool.translation.vector]).collect();
     if let Some(list) = root.opt("links") {
         for (i, value) in list
             .per_joint(joints.len())
@@ -202,7 +205,11 @@ fn describe(root: &DocumentNode, chain: FrameChain, units: FileUnits) -> RobotDe
             .take(joints.len())
         {
             if value.given().is_some() {
+                let place = value.get("centre");
                 let body = link(value, chain.joints[i].frame, units);
+                if let Some(message) = inertia::outside_link(&body.centre.coords, i, &points) {
+                    place.fault(message);
+                }
                 joints[i].mass = Some(body.mass);
                 joints[i].centre = Some(body.centre.into());
                 inertias[i] = body.inertia;

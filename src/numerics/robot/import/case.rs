@@ -1,5 +1,6 @@
 //! The practice layout `robot.json`: axes, points, masses and centres at the zero pose in the base frame, in mm, kg, kg m2 and Nm/A.
 
+use super::inertia::outside_link;
 use super::kinematics::direction;
 use super::place::{DocumentNode, Faults};
 use super::{Imported, RobotFileText, inertia};
@@ -62,7 +63,7 @@ pub fn read(file: RobotFileText) -> Result<Imported> {
             .and_then(DocumentNode::given)
             .map(|value| value.sized(Bound::Factor, Unit::One))
     };
-    let joints = (axes.iter().enumerate())
+    let joints: Vec<JointDescription> = (axes.iter().enumerate())
         .map(|(i, axis)| JointDescription {
             name: format!("J{}", i + 1),
             kind: JointKind::Revolute,
@@ -88,6 +89,14 @@ pub fn read(file: RobotFileText) -> Result<Imported> {
     let offset = root
         .opt("payload_com")
         .map_or_else(Vector3::zeros, |offset| metres(&offset).coords);
+    let reached = joints.iter().map(|joint| Vector3::from(joint.point));
+    let reached: Vec<_> = reached.chain([tool.coords]).collect();
+    for (link, (joint, centre)) in joints.iter().zip(&centres).enumerate() {
+        let place = joint.centre.map(Vector3::from);
+        if let Some(message) = place.and_then(|place| outside_link(&place, link, &reached)) {
+            centre.fault(message);
+        }
+    }
     let robot = RobotDescription {
         name: root
             .opt("name")

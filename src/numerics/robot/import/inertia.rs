@@ -52,6 +52,29 @@ pub fn impossible_inertia(moments: &InertiaMoments) -> Option<String> {
     })
 }
 
+/// m from a link at which its centre may always be: a counterweight.
+const BESIDE: f64 = 1.0;
+
+/// Why a centre is none of its link, from its joint to the next, if so: it is farther away than the whole arm is long.
+pub(super) fn outside_link(
+    centre: &Vector3<f64>,
+    link: usize,
+    points: &[Vector3<f64>],
+) -> Option<String> {
+    let (from, to) = (points.get(link)?, points.get(link + 1)?);
+    let lengths = points.windows(2).map(|pair| (pair[1] - pair[0]).norm());
+    let most = lengths.sum::<f64>().max(BESIDE);
+    let along = to - from;
+    let share = (centre - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
+    let away = (centre - from - along * share.clamp(0.0, 1.0)).norm();
+    (away > most).then(|| {
+        format!(
+            "{away:.3} m from its link, which reaches from its joint to the next; allowed: up to {most:.3} m, the length of the arm; is it in another \
+             unit or frame?"
+        )
+    })
+}
+
 /// The symmetric tensor of six moments.
 pub(super) fn tensor([xx, xy, xz, yy, yz, zz]: &InertiaMoments) -> Matrix3<f64> {
     Matrix3::new(*xx, *xy, *xz, *xy, *yy, *yz, *xz, *yz, *zz)
