@@ -131,31 +131,43 @@ impl Recording {
         Ok(())
     }
 
-    /// Fails where a joint never moves though it is commanded to; `label` names the recordings.
-    pub fn check_motion(&self, label: &str) -> Result<()> {
+    /// Span of the commands of a joint, and whether its angles never leave where they begin.
+    fn motion(&self, joint: usize) -> (f64, bool) {
         let n = self.joints();
-        let still: Vec<String> = (0..n)
-            .filter(|joint| {
-                let all = || (0..self.rows()).map(|row| self.angle[row * n + joint]);
-                let (low, high) = (
-                    all().fold(f64::MAX, f64::min),
-                    all().fold(f64::MIN, f64::max),
-                );
-                let sent = || (0..self.rows()).map(|row| self.command[row * n + joint]);
-                let asked = sent().fold(f64::MIN, f64::max) - sent().fold(f64::MAX, f64::min);
-                high - low < 3.0 * self.encoder[*joint].max(self.noise[*joint])
-                    && asked > 10.0 * self.encoder[*joint].max(1e-3)
-            })
-            .map(|joint| (joint + 1).to_string())
-            .collect();
+        let span = |all: &[f64]| {
+            let of_joint = || all.iter().skip(joint).step_by(n).copied();
+            of_joint().fold(f64::MIN, f64::max) - of_joint().fold(f64::MAX, f64::min)
+        };
+        let still = 3.0 * self.encoder[joint].max(self.noise[joint]);
+        (span(&self.command), span(&self.angle) < still)
+    }
+
+    /// Joints, from 1, that never move though they are commanded to, or that neither are.
+    fn unmoved(&self, commanded: bool) -> String {
+        let is_one = |joint: &usize| {
+            let (sent, is_still) = self.motion(*joint);
+            is_still && (sent > 10.0 * self.encoder[*joint].max(1e-3)) == commanded
+        };
+        let all = (0..self.joints()).filter(is_one);
+        let all: Vec<String> = all.map(|joint| (joint + 1).to_string()).collect();
+        all.join(", ")
+    }
+
+    /// Fails where a joint never moves though it is commanded to; `label` names the recordings. Joints that rest are told, in a sentence.
+    pub fn check_motion(&self, label: &str) -> Result<Option<String>> {
+        let still = self.unmoved(true);
         if !still.is_empty() {
             let message = format!(
-                "joint {} never moves though it is commanded to; is its column the right one? A joint that is held is left out of `joints`",
-                still.join(", ")
+                "joint {still} never moves though it is commanded to; is its column the right one? A joint that is held is left out of `joints`"
             );
             return Err(Error::data(label, message));
         }
-        Ok(())
+        let rests = Some(self.unmoved(false)).filter(|rests| !rests.is_empty());
+        Ok(rests.map(|rests| {
+            format!(
+                "{label}: joint {rests} rests, so that nothing is learnt of its drive and friction; a joint that is held is left out of `joints`"
+            )
+        }))
     }
 
     /// Puts another recording of the same drives behind this one; its clock goes on after ours.
