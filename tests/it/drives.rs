@@ -148,6 +148,14 @@ fn drives_are_exported_to_mujoco_isaac_and_json_with_what_was_found() {
         mjcf.contains("mrad rms before") && !mjcf.contains("not carried"),
         "{mjcf}"
     );
+    let control = of_the_example("export --quiet --format mjcf-control").out;
+    assert!(
+        control.starts_with("# calib export: format mjcf-control")
+            && control.contains("NAMES = [\"pan\", \"lift\", \"elbow\"]")
+            && control.contains("\"torque_limit\": [4.0, 4.0, 4.0]")
+            && !control.contains("{{"),
+        "{control}"
+    );
     let isaac = of_the_example("export --quiet --format isaac").out;
     assert!(
         isaac.contains("\"lift\":\n") && isaac.contains("min_delay: 3  # of 15.0"),
@@ -161,7 +169,9 @@ fn drives_are_exported_to_mujoco_isaac_and_json_with_what_was_found() {
     );
     let refused = of_the_example("export --quiet --format urdf");
     assert!(
-        refused.err.contains("allowed: mjcf, isaac, json"),
+        refused
+            .err
+            .contains("allowed: mjcf, mjcf-control, isaac, json"),
         "{}",
         refused.err
     );
