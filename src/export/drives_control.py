@@ -51,13 +51,13 @@ class Control:
         self.integral, self.drawn = self.integral_start.clip(-self.integral_limit, self.integral_limit), np.zeros(2)
 
     def begin(self, data, since=0.0):
-        """A motion from rest, `since` s after the joints were cold; drives' integrals run on."""
+        """A motion from rest, `since` s after a recording began, when the joints were cold; drives' integrals run on."""
         mujoco.mj_forward(self.model, data)
         weight = data.qfrc_bias[self.v]
         for k, j in enumerate(self.geared):
             carried = data.qfrc_bias[self.gear_v[k]]
             data.qpos[self.gear_q[k]] = -carried / self.gear_stiffness[j] - 0.5 * self.gear_play[j] * np.sign(carried)
-        self.began, self.cold, self.slot, self.sent = data.time, data.time - since, -1, []
+        self.cold, self.slot, self.sent = data.time - since, -1, []
         self.load, self.before, self.bent = weight.copy(), np.zeros((2, len(NAMES))), None
 
     def angles(self, data):
@@ -67,15 +67,14 @@ class Control:
 
     def commanded(self, data, command, speed):
         """Commands held, delayed, slewed: the mean over the next step."""
-        h, t = self.model.opt.timestep, data.time - self.began
+        h = self.model.opt.timestep
         command, speed = np.array(command, float), np.zeros(len(NAMES)) if speed is None else np.array(speed, float)
         if hold := ARM["command_hold"]:
-            slot = np.floor(t / hold + 1e-6)
+            slot = np.floor((data.time - self.cold) / hold + 1e-6)
             if slot > self.slot:
                 last = self.taken[0] if self.sent else command
-                self.slot, self.taken, self.took = slot, (command, (command - last) * ARM["command_rate"]), t
-            command = self.taken[0]
-            speed = self.taken[1] * (t < self.took + 1 / ARM["command_rate"] - 1e-6)
+                self.slot, self.taken = slot, (command, (command - last) / hold)
+            command, speed = self.taken
         if not self.sent:
             self.set_point = command.copy()
             self.sent = [(command, 0 * speed)] * (int(self.command_delay.max() / h) + 2)
@@ -125,8 +124,7 @@ class Control:
             torque[j] += sum(share * given[by] for by, share in COUPLINGS[j])
             for over, of, dry, first, step, values in CURVES[j]:
                 x = {"angle": link[of], "speed": abs(link_ahead[of]), "velocity": link_ahead[of], "acceleration": a[of], "time": time}[over]
-                value = np.interp(x, first + step * np.arange(len(values)), values)
-                (dry_curve if dry else torque)[j] += value
+                (dry_curve if dry else torque)[j] += curve((x - first) / step, values)
         # Friction.
         cold = np.exp(-time / self.warm_up_time)
         m.dof_damping[self.v] = self.damping * (1 + self.warm_up_share_viscous * cold).clip(0)
@@ -159,6 +157,17 @@ class Control:
             elif half > 0:
                 data.qfrc_applied[self.gear_v[k]] = 0
         self.before = np.array([v, a])
+
+
+def curve(at, values):
+    """A curve by its values at knots 0, 1 .., smooth between them (Catmull and Rom), held beyond them."""
+    at = min(max(at, 0), len(values) - 1)
+    k = min(int(at), len(values) - 2)
+    a, b = values[k : k + 2]
+    before = values[k - 1] if k > 0 else 2 * a - b
+    after = values[k + 2] if k + 2 < len(values) else 2 * b - a
+    t, m, n = at - k, 0.5 * (b - before), 0.5 * (after - a)
+    return a + t * (m + t * (3 * (b - a) - 2 * m - n + t * (2 * (a - b) + m + n)))
 
 
 def bend(bent, way):

@@ -3,7 +3,7 @@
 use crate::chain::Bodies;
 use nalgebra::Point3;
 
-/// A function of one variable by its values at even knots, which is held beyond them.
+/// A function of one variable by its values at even knots, smooth between them (Catmull and Rom, 1974), which is held beyond them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// What it follows.
@@ -44,8 +44,18 @@ impl Curve {
         let last = self.values.len() - 1;
         let at = ((x - self.knots[0]) / self.knots[1]).clamp(0.0, last as f64);
         let k = (at as usize).min(last.saturating_sub(1));
-        let share = at - k as f64;
-        self.values[k] * (1.0 - share) + self.values[(k + 1).min(last)] * share
+        let t = at - k as f64;
+        let value = |k: usize| self.values[k.min(last)];
+        let (a, b) = (value(k), value(k + 1));
+        // At an end the curve goes on as it begins.
+        let before = if k > 0 { value(k - 1) } else { 2.0 * a - b };
+        let after = if k + 2 <= last {
+            value(k + 2)
+        } else {
+            2.0 * b - a
+        };
+        let (m, n) = (0.5 * (b - before), 0.5 * (after - a));
+        a + t * (m + t * (3.0 * (b - a) - 2.0 * m - n + t * (2.0 * (a - b) + m + n)))
     }
 }
 

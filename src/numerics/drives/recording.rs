@@ -53,6 +53,8 @@ const GAP: f64 = 12.0;
 pub const PAUSE: f64 = 0.5;
 /// s between two recordings, whose clocks do not say it.
 const BREAK: f64 = 1.0;
+/// Share of the period by which a command may be stamped later than it is taken.
+const EARLY: f64 = 0.2;
 /// s at the beginning in which a trajectory rests.
 const REST: f64 = 0.4;
 /// Steps of the encoder, plus standard deviations of the noise, that the angles of a joint at rest span at most.
@@ -304,22 +306,16 @@ impl Recording {
             time.push(self.time[row]);
             value.extend_from_slice(&self.command[row * n..(row + 1) * n]);
         }
+        let mut lasts: Vec<f64> = counts.iter().map(|count| count * self.period).collect();
         if hold > 0.0 {
-            // Commands that come between two that are taken are lost.
-            let (mut taken, mut last) = (0, f64::MIN);
-            for k in 0..time.len() {
-                let slot = ((time[k] - time[0]) / hold + 1e-6).floor();
-                if slot > last {
-                    (taken, last) = (k, slot);
-                }
-                value.copy_within(taken * n..(taken + 1) * n, k * n);
-            }
+            (time, value) = self.taken(trajectory, &time, &value, hold);
+            lasts = vec![hold; time.len()];
         }
         let mut speed = vec![0.0; value.len()];
         for k in 1..time.len() {
             for joint in 0..n {
                 speed[k * n + joint] =
-                    (value[k * n + joint] - value[(k - 1) * n + joint]) / (counts[k] * self.period);
+                    (value[k * n + joint] - value[(k - 1) * n + joint]) / lasts[k];
             }
         }
         let summed = |of: &[f64]| {
@@ -340,6 +336,31 @@ impl Recording {
             speed,
             joints: n,
         }
+    }
+
+    /// Times and commands of a drive whose own clock runs on through the recording and takes at each tick the last command that was sent.
+    fn taken(
+        &self,
+        trajectory: &Trajectory,
+        sent: &[f64],
+        value: &[f64],
+        hold: f64,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let (n, began) = (self.joints(), trajectory.began);
+        let (first, last) = (sent[0], sent[sent.len() - 1]);
+        let slot = ((first - began) / hold + 1e-6).floor();
+        let ticks = (1..).map(|k| began + (slot + f64::from(k)) * hold);
+        let ticks = ticks.take_while(|tick| *tick <= last);
+        let (mut time, mut taken, mut row) = (vec![first], value[..n].to_vec(), 0);
+        for tick in ticks {
+            // Stamps of rows that are due at a tick may be a little later.
+            while row + 1 < sent.len() && sent[row + 1] <= tick + EARLY * self.period {
+                row += 1;
+            }
+            time.push(tick);
+            taken.extend_from_slice(&value[row * n..(row + 1) * n]);
+        }
+        (time, taken)
     }
 
     /// A command between rows `row - 1` and `row`, by the cubic through the neighbours (Catmull and Rom).
