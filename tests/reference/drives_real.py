@@ -97,6 +97,28 @@ def diagnosed(calib, folder):
     return document, {name: values[:, k] for k, name in enumerate(head)}
 
 
+def in_mujoco(calib, folder, recordings, stated):
+    """The residual (mrad rms) of the exported MJCF with the Python beside it, rolled out in MuJoCo, over that which calib states; of rows that judge.
+    `recordings` as (time, command, angle, fitted rows)."""
+    sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
+    from drives_in_mujoco import rolled_out
+
+    def exported(name):
+        words = [calib, "export", "--store", str(folder / "store"), "--quiet", "--format", name, str(folder / "pipeline.yaml")]
+        done = subprocess.run(words, capture_output=True, text=True)
+        return done.stdout if done.returncode == 0 else sys.exit(done.stderr)
+
+    drives = json.loads((folder / "drives.json").read_text())
+    text, control = exported("mjcf"), exported("mjcf-control")
+    errors = []
+    for time, command, angle, fitted in recordings:
+        if not fitted.all():
+            (simulated,) = rolled_out(text, drives, [(time, command, angle)], control)
+            errors.append((angle - simulated)[~fitted].ravel())
+    rms = 1e3 * np.sqrt((np.concatenate(errors) ** 2).mean())
+    print(f"  in MuJoCo: {rms:.3f} mrad, {rms / stated:.3f} of the {stated:.3f} mrad that are stated", flush=True)
+
+
 def recording(folder, is_fitted):
     """Time, commands, angles and rows to fit of a recording of the arm."""
 
@@ -275,6 +297,11 @@ def main():
             held = course["held_out"] > 0
             print(f"go2 {leg}: deg rms held out, before and after")
             tell(document)
+            table = np.loadtxt(options.data / "go2_chirp" / "recording.csv", delimiter=",", skiprows=1)
+            own = 3 * LEGS.index(leg) + np.arange(3)
+            rows = np.floor((table[:, 0] - table[0, 0] + 1e-6) / 1.5) % 2 == 0
+            all_rows = (table[:, 0], table[:, 1 + own], table[:, 13 + own], rows)
+            in_mujoco(options.calib, options.out / f"go2_{leg}", [all_rows], document["after"]["validate_rms_mrad"])
             for j, part in enumerate(PARTS, 1):
                 errors = [np.degrees(course[f"measured{j}_rad"] - course[f"{what}{j}_rad"]) for what in ("simulated", "corrected")]
                 before, after = (np.sqrt((e[held] ** 2).mean()) for e in errors)
@@ -305,6 +332,8 @@ def of_so101(options):
     folder, names = so101(options.data, options.out)
     document, course = diagnosed(options.calib, folder)
     tell(document)
+    recordings = [recording(options.data / "so101_sage" / name, name in FITTED) for name in names]
+    in_mujoco(options.calib, folder, recordings, document["after"]["validate_rms_mrad"])
     breaks = np.flatnonzero(np.diff(course["time_s"]) > 0.5) + 1
     parts = np.split(np.arange(len(course["time_s"])), breaks)
     index = range(1, len(ARM) + 1)

@@ -384,3 +384,43 @@ impl Joint {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_goes_through_its_knots_smoothly_and_is_held_beyond_them() {
+        let value = |values: &[f64], x: f64| {
+            let curve = Curve {
+                over: Over::Time,
+                knots: [1.0, 0.5],
+                values: values.to_vec(),
+                dry: false,
+            };
+            let none = Motion {
+                q: &[],
+                v: &[],
+                middle: &[],
+                ahead: &[],
+                a: &[],
+                time: x,
+                driven: &[],
+                load: &[],
+            };
+            curve.value(&none)
+        };
+        let line = [1.0, 2.0, 3.0, 4.0];
+        for (x, expected) in [(0.0, 1.0), (1.2, 1.4), (2.1, 3.2), (9.0, 4.0)] {
+            assert!((value(&line, x) - expected).abs() < 1e-12, "{x}");
+        }
+        // Of a wave of six knots a turn a broken line errs by 13 %, the curve by a few.
+        let turn = std::f64::consts::TAU / 6.0;
+        let wave: Vec<f64> = (0..13).map(|k| (turn * f64::from(k)).sin()).collect();
+        for step in 0..40 {
+            let at = 3.0 + 0.15 * f64::from(step);
+            let error = value(&wave, 1.0 + 0.5 * at) - (turn * at).sin();
+            assert!(error.abs() < 0.03, "{at}: {error}");
+        }
+    }
+}

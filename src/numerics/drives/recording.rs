@@ -445,6 +445,25 @@ mod tests {
     }
 
     #[test]
+    fn a_drive_that_takes_commands_rarely_does_so_at_ticks_of_its_own_clock() {
+        let mut recording = recording();
+        recording.trajectories[0].rows = 100..200;
+        let whole = &recording.trajectories[0];
+        let command = |row: usize| recording.command[2 * row];
+        // From the beginning of the recording on every 30 ms: 1.02 s, 1.05 s ..
+        let held = recording.commands(whole, 0.03);
+        let close =
+            |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9;
+        assert!(close(held.mean(0, 1.015, 1.016, 0), [command(100), 0.0]));
+        let rate = (command(102) - command(100)) / 0.03;
+        assert!(close(held.mean(0, 1.025, 1.026, 0), [command(102), rate]));
+        // Between two rows the last one that was sent.
+        let held = recording.commands(whole, 0.015);
+        let rate = (command(103) - command(102)) / 0.015;
+        assert!(close(held.mean(0, 1.036, 1.037, 0), [command(103), rate]));
+    }
+
+    #[test]
     fn recordings_of_the_same_drives_follow_each_other_each_with_its_own_clock() {
         let (mut whole, later) = (recording(), recording());
         whole.append(&later);
