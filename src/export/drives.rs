@@ -1,6 +1,7 @@
 //! The simulation of a diagnosis of drives, to run where it is simulated: MuJoCo's model, Isaac Lab's actuator settings, JSON.
 
 use super::body::{document, numbers};
+use crate::drives::physics::{LOAD_LAG, Over, ROTOR_SHARE, SAG_LAG};
 use crate::error::{Error, Result, one_line};
 use crate::identified::IdentifiedDrives;
 use crate::table::{FindingRow, Table};
@@ -43,6 +44,12 @@ pub(crate) const DRIVE_FORMATS: &[DriveFormat] = &[
         text: mjcf,
     },
     DriveFormat {
+        name: "mjcf-control",
+        help: "Python beside the MJCF of diagnosed drives: what MuJoCo's model cannot hold, put in before every step",
+        carries: &[],
+        text: control,
+    },
+    DriveFormat {
         name: "isaac",
         help: "Isaac Lab's actuators of diagnosed drives: gains, armature, friction, limits, delay in steps",
         carries: &[
@@ -71,8 +78,8 @@ const STEP: f64 = 5e-4;
 const ISAAC_STEP: f64 = 5e-3;
 /// Digits of the hash of a model.
 const DIGITS: usize = 16;
-/// Share of the armature that moves with the link where a gear yields.
-const LINK_SHARE: f64 = 1.0 - crate::drives::physics::ROTOR_SHARE;
+/// s, by which MuJoCo's Runge and Kutta takes delayed controls too early: it interpolates between those of two steps.
+const EARLY: f64 = 0.5 * STEP;
 
 /// What is exported.
 pub(crate) struct DriveExport {
@@ -120,6 +127,9 @@ impl DriveExport {
                 finding.effect, finding.place
             )
         }));
+        if self.format.name == "mjcf" && self.left_out().next().is_some() {
+            lines.push("what is not carried is in the Python of `--format mjcf-control`".into());
+        }
         Ok(lines)
     }
 
@@ -180,10 +190,13 @@ fn mjcf(export: &DriveExport) -> Result<String> {
         let centre = export.three("link", number, ["centre_x", "centre_y", "centre_z"]);
         let diagonal = export.three("link", number, ["ixx", "iyy", "izz"]);
         let products = export.three("link", number, ["ixy", "ixz", "iyz"]);
+        let geared = of("gear_stiffness") > 0.0;
+        // Of a gear that yields the rest moves with the link.
+        let armature = of("armature") * if geared { ROTOR_SHARE } else { 1.0 };
         let mut attributes = vec![
             ("damping", of("damping")),
             ("frictionloss", of("friction")),
-            ("armature", of("armature")),
+            ("armature", armature),
             ("stiffness", of("spring_stiffness")),
             ("springref", of("spring_reference")),
         ];
@@ -198,12 +211,11 @@ fn mjcf(export: &DriveExport) -> Result<String> {
                 .limit(number)
                 .map(|limit| ("actuatorfrcrange", numbers([-limit, limit]))),
         );
-        let gear = (of("gear_stiffness") > 0.0).then(|| {
+        let gear = geared.then(|| {
             let half = 0.5 * of("gear_play");
             let mut gear = vec![
                 ("stiffness", numbers([of("gear_stiffness")])),
                 ("damping", numbers([of("gear_damping")])),
-                ("armature", numbers([LINK_SHARE * of("armature")])),
             ];
             if half > 0.0 {
                 gear.remove(0);
@@ -227,6 +239,7 @@ fn mjcf(export: &DriveExport) -> Result<String> {
         let delay = of("command_delay");
         let delay = match delay > 0.0 {
             true => {
+                let delay = delay + EARLY;
                 let samples = (delay / STEP).ceil() + 2.0;
                 format!(" delay=\"{delay:?}\" nsample=\"{samples}\" interp=\"linear\"")
             }
@@ -234,7 +247,7 @@ fn mjcf(export: &DriveExport) -> Result<String> {
         };
         let speed_on_angle = if on_error { 0.0 } else { -kd };
         joints.push(context! {
-            name => one_line(name), gear, attributes,
+            name => one_line(name), gear, attributes, link_armature => numbers([of("armature") - armature]),
             kind => if of("slides") > 0.0 { "slide" } else { "hinge" },
             offset => numbers(minus(point, before)),
             axis => numbers(export.three("joint", number, ["axis_x", "axis_y", "axis_z"])),
@@ -261,6 +274,104 @@ fn mjcf(export: &DriveExport) -> Result<String> {
         gravity => numbers(export.three("arm", 0, ["gravity_x", "gravity_y", "gravity_z"])),
     };
     document(&remarks, include_str!("drives.xml"), values)
+}
+
+/// Numbers of a joint that the controller reads.
+const CONTROLLED: [&str; 29] = [
+    "kp",
+    "kd",
+    "kd_on_error",
+    "torque_limit",
+    "command_offset",
+    "command_delay",
+    "dead_band",
+    "speed_limit",
+    "integral_gain",
+    "integral_limit",
+    "integral_start",
+    "damping",
+    "friction",
+    "stribeck_friction",
+    "stribeck_speed",
+    "load_friction_driving",
+    "load_friction_back",
+    "gear_friction_driving",
+    "gear_friction_back",
+    "presliding",
+    "warm_up_share",
+    "warm_up_share_viscous",
+    "warm_up_time",
+    "spring_stiffness",
+    "spring_reference",
+    "gear_stiffness",
+    "gear_damping",
+    "gear_play",
+    "gear_encoder_on_link",
+];
+
+/// A list as Python reads it.
+fn list(items: impl IntoIterator<Item = String>) -> String {
+    let items: Vec<String> = items.into_iter().collect();
+    format!("[{}]", items.join(", "))
+}
+
+fn control(export: &DriveExport) -> Result<String> {
+    let simulation = &export.drives.simulation;
+    let joints = || 1..=export.joints();
+    let float = |value: f64| format!("{value:?}");
+    let drive = CONTROLLED.map(|name| {
+        let of = |joint: usize| match name {
+            "torque_limit" | "speed_limit" => simulation.value("joint", joint, name),
+            _ => Some(export.joint(joint, name)),
+        };
+        let values = joints().map(|joint| of(joint).map_or("None".into(), float));
+        format!("    {name:?}: {},\n", list(values))
+    });
+    let arm = ["command_rate", "command_hold", "voltage_sag"].map(|name| {
+        let value = simulation.value("arm", 0, name).unwrap_or(0.0);
+        format!("{name:?}: {value:?}")
+    });
+    let ripples = |joint| {
+        list(
+            simulation
+                .ripples(joint)
+                .into_iter()
+                .map(|wave| list(wave.map(float))),
+        )
+    };
+    let couplings = |joint| {
+        let all = simulation.couplings(joint).into_iter();
+        list(all.map(|(by, share)| format!("({by}, {share:?})")))
+    };
+    let curves = |joint| {
+        let all = simulation.curves(joint).into_iter();
+        list(all.map(|curve| {
+            let (over, of) = match curve.over {
+                Over::Angle(by) => ("angle", by),
+                Over::Speed(by) => ("speed", by),
+                Over::Velocity(by) => ("velocity", by),
+                Over::Acceleration(by) => ("acceleration", by),
+                Over::Time => ("time", 0),
+            };
+            let dry = if curve.dry { "True" } else { "False" };
+            let [first, step] = curve.knots;
+            let values = list(curve.values.into_iter().map(float));
+            format!("({over:?}, {of}, {dry}, {first:?}, {step:?}, {values})")
+        }))
+    };
+    let head = export.remarks()?;
+    let head = head.iter().map(|line| format!("# {}\n", one_line(line)));
+    let values = context! {
+        names => list(simulation.joints().into_iter().map(quoted)),
+        arm => format!("{{{}}}", arm.join(", ")),
+        drive => format!("{{\n{}}}", drive.concat()),
+        ripples => list(joints().map(ripples)), couplings => list(joints().map(couplings)), curves => list(joints().map(curves)),
+        lags => format!("{SAG_LAG:?}, {LOAD_LAG:?}"),
+    };
+    let body = crate::text::environment()
+        .render_str(include_str!("drives_control.py"), values)
+        .map_err(|error| Error::Bug(error.to_string()))?;
+    Ok(head.collect::<String>() + &body)
 }
 
 /// A text in quotes, as YAML and JSON read it.

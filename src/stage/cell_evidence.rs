@@ -10,8 +10,8 @@ use crate::{
     AskedRows, Context, Diagnose, DiagnoseReads, DiagnoseTorques, DiagnoseTorquesReads, RawFile,
     Stage,
 };
-use calib_engine::AMPLITUDES;
 use calib_diagnose::{CellAnswer, GivenCell, cell_evidence};
+use calib_engine::AMPLITUDES;
 use calib_numerics::criteria::cells::{LARGEST, SMALLEST};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -27,6 +27,10 @@ const MOST_BYTES: u64 = 1 << 30;
 
 /// Causes a joint at most.
 const MOST_A_JOINT: usize = 3;
+/// Cells of one name and place that are tried: load friction by the drive's torque or by the gear's, waves of two lengths.
+const FORMS: usize = 2;
+/// Trials that are fitted to the end before one joins: limits and friction that sticks are far from linear.
+const LAST: usize = 2;
 
 /// Settings of `diagnose_drives`.
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -232,7 +236,7 @@ impl ClockUnit {
 }
 
 crate::stage! {
-    DiagnoseDrives, "diagnose_drives", 10, "names the physics that the simulation of commanded joints lacks, from commands and angles",
+    DiagnoseDrives, "diagnose_drives", 11, "names the physics that the simulation of commanded joints lacks, from commands and angles",
         DiagnoseDrivesReads {} -> DiagnoseDrivesWrites {
             verdict: DriveVerdict,
             sentences: VerdictSentences,
@@ -339,6 +343,8 @@ impl Stage for DiagnoseDrives {
         drives.without.clone_from(&self.without);
         let options = Options {
             most: MOST_A_JOINT * drives.recording.joints(),
+            forms: FORMS,
+            last: LAST,
             ..Options::default()
         };
         let diagnosis = diagnose(

@@ -12,9 +12,10 @@ use crate::dynamics::Inertial;
 use crate::error::Result;
 use crate::store::frame::{Cell, Frame, FrameBuilder};
 use calib_drives::mjcf::MjcfArm;
-use calib_drives::physics::{Joint, Physics};
+use calib_drives::physics::{Curve, Joint, Over, Physics};
 use calib_drives::recording::Recording;
 use calib_drives::{DriveDiagnosis, Drives};
+use std::borrow::Cow;
 
 beside_findings! { DriveDiagnosis => FindingNumbers::of_drives of FindingNumberRow, Rivals::of_drives of RivalRow }
 
@@ -86,11 +87,17 @@ impl JointDrives {
 }
 
 /// A quantity with its unit, and its value.
-type Quantity = (&'static str, &'static str, f64);
+type Quantity = (Cow<'static, str>, &'static str, f64);
 
-/// Numbers of a joint's drive and friction; of causes that are lists (ripple, coupling, curves) the findings have them.
+fn named(all: impl IntoIterator<Item = (&'static str, &'static str, f64)>) -> Vec<Quantity> {
+    let all = all.into_iter();
+    all.map(|(name, unit, value)| (name.into(), unit, value))
+        .collect()
+}
+
+/// Numbers of a joint's drive and friction.
 fn of_joint(joint: &Joint) -> Vec<Quantity> {
-    let mut all = vec![
+    let mut all = named([
         ("kp", "Nm/rad", joint.kp),
         ("kd", "Nm s/rad", joint.kd),
         ("kd_on_error", "1", f64::from(u8::from(joint.kd_on_error))),
@@ -101,6 +108,7 @@ fn of_joint(joint: &Joint) -> Vec<Quantity> {
         ("speed_limit", "rad/s", joint.speed_limit),
         ("integral_gain", "Nm/(rad s)", joint.integral[0]),
         ("integral_limit", "Nm", joint.integral[1]),
+        ("integral_start", "Nm", joint.integral_start),
         ("damping", "Nm s/rad", joint.damping),
         ("friction", "Nm", joint.friction),
         ("stribeck_friction", "Nm", joint.stribeck[0]),
@@ -116,9 +124,9 @@ fn of_joint(joint: &Joint) -> Vec<Quantity> {
         ("armature", "kg m2", joint.armature),
         ("spring_stiffness", "Nm/rad", joint.spring[0]),
         ("spring_reference", "rad", joint.spring[1]),
-    ];
+    ]);
     if let Some(gear) = &joint.gear {
-        all.extend([
+        all.extend(named([
             ("gear_stiffness", "Nm/rad", gear.stiffness),
             ("gear_damping", "Nm s/rad", gear.damping),
             ("gear_play", "rad", gear.play),
@@ -127,14 +135,57 @@ fn of_joint(joint: &Joint) -> Vec<Quantity> {
                 "1",
                 f64::from(u8::from(gear.encoder_on_link)),
             ),
-        ]);
+        ]));
+    }
+    for (k, wave) in (1..).zip(&joint.ripple) {
+        let parts = RIPPLE.into_iter().zip(["1", "Nm", "Nm"]).zip(wave);
+        all.extend(parts.map(|((part, unit), value)| (ripple(k, part).into(), unit, *value)));
+    }
+    for (by, share) in &joint.coupling {
+        all.push((coupling(*by).into(), "1", *share));
+    }
+    for curve in &joint.curves {
+        let name = curve_name(curve.over, curve.dry);
+        let [first, step] = curve.knots;
+        let unit = match curve.over {
+            Over::Angle(_) => "rad",
+            Over::Speed(_) | Over::Velocity(_) => "rad/s",
+            Over::Acceleration(_) => "rad/s2",
+            Over::Time => "s",
+        };
+        all.push((format!("{name}_from").into(), unit, first));
+        all.push((format!("{name}_step").into(), unit, step));
+        let values = curve.values.iter().enumerate();
+        all.extend(values.map(|(k, value)| (format!("{name}_{k}").into(), "Nm", *value)));
     }
     all
 }
 
+const RIPPLE: [&str; 3] = ["waves", "cosine", "sine"];
+
+fn ripple(number: usize, part: &str) -> String {
+    format!("ripple{number}_{part}")
+}
+
+fn coupling(by: usize) -> String {
+    format!("share_of_drive{}", by + 1)
+}
+
+/// What a curve is called, joints from 1.
+fn curve_name(over: Over, dry: bool) -> String {
+    let what = if dry { "friction" } else { "torque" };
+    match over {
+        Over::Angle(by) => format!("{what}_over_angle{}", by + 1),
+        Over::Speed(by) => format!("{what}_over_speed{}", by + 1),
+        Over::Velocity(by) => format!("{what}_over_velocity{}", by + 1),
+        Over::Acceleration(by) => format!("{what}_over_acceleration{}", by + 1),
+        Over::Time => format!("{what}_over_time"),
+    }
+}
+
 fn of_link(body: &Inertial) -> Vec<Quantity> {
     let (c, i) = (body.centre, body.inertia);
-    vec![
+    named([
         ("mass", "kg", body.mass),
         ("centre_x", "m", c.x),
         ("centre_y", "m", c.y),
@@ -145,12 +196,12 @@ fn of_link(body: &Inertial) -> Vec<Quantity> {
         ("ixy", "kg m2", i[(0, 1)]),
         ("ixz", "kg m2", i[(0, 2)]),
         ("iyz", "kg m2", i[(1, 2)]),
-    ]
+    ])
 }
 
 fn of_arm(physics: &Physics) -> Vec<Quantity> {
     let (g, tool) = (physics.bodies.gravity, physics.tool);
-    vec![
+    named([
         ("gravity_x", "m/s2", g.x),
         ("gravity_y", "m/s2", g.y),
         ("gravity_z", "m/s2", g.z),
@@ -159,7 +210,7 @@ fn of_arm(physics: &Physics) -> Vec<Quantity> {
         ("tool_z", "m", tool.z),
         ("command_hold", "s", physics.hold),
         ("voltage_sag", "1/Nm", physics.sag),
-    ]
+    ])
 }
 
 impl DriveSimulation {
@@ -178,7 +229,7 @@ impl DriveSimulation {
                     part: part.into(),
                     number: number as i64,
                     name: name.into(),
-                    quantity: quantity.into(),
+                    quantity: quantity.clone().into_owned(),
                     unit: unit.into(),
                     believed: believed.and_then(|(.., value)| finite(*value)),
                     value: finite(value),
@@ -186,13 +237,13 @@ impl DriveSimulation {
             }
         };
         let (base, found) = (&drives.base, &diagnosis.physics);
-        let rate = vec![("command_rate", "Hz", 1.0 / drives.recording.period)];
+        let rate = named([("command_rate", "Hz", 1.0 / drives.recording.period)]);
         push("arm", 0, rate.clone(), rate);
         push("arm", 0, of_arm(base), of_arm(found));
         for joint in 0..base.joints.len() {
             let (axis, point) = (arm.arm.axes[joint], arm.arm.points[joint]);
             let prismatic = f64::from(u8::from(arm.arm.prismatic[joint]));
-            let place = vec![
+            let place = named([
                 ("slides", "1", prismatic),
                 ("reference", "rad", arm.joints[joint].reference),
                 ("axis_x", "1", axis.x),
@@ -201,7 +252,7 @@ impl DriveSimulation {
                 ("point_x", "m", point.x),
                 ("point_y", "m", point.y),
                 ("point_z", "m", point.z),
-            ];
+            ]);
             push("joint", joint + 1, place.clone(), place);
             let (before, after) = (&base.joints[joint], &found.joints[joint]);
             push("joint", joint + 1, of_joint(before), of_joint(after));
@@ -217,6 +268,47 @@ impl DriveSimulation {
             row.part == part && row.number == number as i64 && row.quantity == quantity
         };
         self.0.iter().find(is_it)?.value
+    }
+
+    /// Ripples of a joint (from 1): waves a turn, Nm of cosine and sine.
+    pub fn ripples(&self, joint: usize) -> Vec<[f64; 3]> {
+        let wave = |number: usize| {
+            let part = |k: usize| self.value("joint", joint, &ripple(number, RIPPLE[k]));
+            Some([part(0)?, part(1)?, part(2)?])
+        };
+        (1..).map_while(wave).collect()
+    }
+
+    /// Drives whose torque is felt at a joint (from 1): which (from 0), and the share of it.
+    pub fn couplings(&self, joint: usize) -> Vec<(usize, f64)> {
+        let drives = 0..self.joints().len();
+        let share = |by: usize| Some((by, self.value("joint", joint, &coupling(by))?));
+        drives.filter_map(share).collect()
+    }
+
+    /// Curves of a joint (from 1).
+    pub fn curves(&self, joint: usize) -> Vec<Curve> {
+        let of = |by: usize| {
+            [
+                Over::Angle(by),
+                Over::Speed(by),
+                Over::Velocity(by),
+                Over::Acceleration(by),
+            ]
+        };
+        let all = (0..self.joints().len()).flat_map(of).chain([Over::Time]);
+        let all = all.flat_map(|over| [(over, false), (over, true)]);
+        let curve = |(over, dry): (Over, bool)| {
+            let name = curve_name(over, dry);
+            let value = |part: String| self.value("joint", joint, &format!("{name}_{part}"));
+            Some(Curve {
+                over,
+                knots: [value("from".into())?, value("step".into())?],
+                values: (0..).map_while(|k: usize| value(k.to_string())).collect(),
+                dry,
+            })
+        };
+        all.filter_map(curve).collect()
     }
 
     /// Names of the joints, in the order of the chain.

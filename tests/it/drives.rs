@@ -148,6 +148,14 @@ fn drives_are_exported_to_mujoco_isaac_and_json_with_what_was_found() {
         mjcf.contains("mrad rms before") && !mjcf.contains("not carried"),
         "{mjcf}"
     );
+    let control = of_the_example("export --quiet --format mjcf-control").out;
+    assert!(
+        control.starts_with("# calib export: format mjcf-control")
+            && control.contains("NAMES = [\"pan\", \"lift\", \"elbow\"]")
+            && control.contains("\"torque_limit\": [4.0, 4.0, 4.0]")
+            && !control.contains("{{"),
+        "{control}"
+    );
     let isaac = of_the_example("export --quiet --format isaac").out;
     assert!(
         isaac.contains("\"lift\":\n") && isaac.contains("min_delay: 3  # of 15.0"),
@@ -161,7 +169,9 @@ fn drives_are_exported_to_mujoco_isaac_and_json_with_what_was_found() {
     );
     let refused = of_the_example("export --quiet --format urdf");
     assert!(
-        refused.err.contains("allowed: mjcf, isaac, json"),
+        refused
+            .err
+            .contains("allowed: mjcf, mjcf-control, isaac, json"),
         "{}",
         refused.err
     );
@@ -218,12 +228,17 @@ pub(crate) fn folder() -> Folder {
 }
 
 impl Folder {
-    /// What is said of it.
-    fn refused(&self) -> String {
+    fn written(&self) -> TempDir {
         let case = tempfile::tempdir().unwrap();
         put(case.path(), "robot.xml", &self.robot);
         put(case.path(), "drives.json", self.drives.to_string());
         put(case.path(), "recording.csv", &self.recording);
+        case
+    }
+
+    /// What is said of it.
+    fn refused(&self) -> String {
+        let case = self.written();
         let store = tempfile::tempdir().unwrap();
         let answer = diagnose(case.path(), store.path());
         assert_ne!(answer.code, Some(0), "{}", answer.out);
@@ -304,6 +319,136 @@ fn an_actuator_that_is_not_read_and_lists_of_other_lengths_are_refused_with_thei
     assert!(looped.refused().contains("<connect> closes a loop"));
 }
 
+#[test]
+fn couplings_and_servos_that_are_not_read_are_refused_by_element_attribute_and_line() {
+    let with = |element: &str| {
+        let mut folder = folder();
+        folder.robot = folder
+            .robot
+            .replace("</mujoco>", &format!("{element}</mujoco>"));
+        folder.refused()
+    };
+    let cases: [(&str, &[&str]); 6] = [
+        (
+            "<equality><joint joint1=\"j1\" joint2=\"j1\"/></equality>",
+            &["robot.xml:3", "couples joints of the chain"],
+        ),
+        (
+            "<tendon><fixed><joint joint=\"j1\" coef=\"1\"/></fixed></tendon>",
+            &[
+                "robot.xml:3",
+                "a tendon on a joint of the chain is not read",
+            ],
+        ),
+        (
+            "<actuator><general joint=\"j1\" dyntype=\"integrator\" gainprm=\"9\"/></actuator>",
+            &["robot.xml:3", "dyntype=\"integrator\"", "allowed: none"],
+        ),
+        (
+            "<actuator><position joint=\"j1\" kp=\"9\" timeconst=\"0.1\"/></actuator>",
+            &[
+                "robot.xml:3",
+                "timeconst of an actuator of joint `j1`",
+                "allowed: 0",
+            ],
+        ),
+        (
+            "<actuator><general joint=\"j1\" gainprm=\"9\" biastype=\"affine\" biasprm=\"0 -4 0\"/></actuator>",
+            &["robot.xml:3", "gainprm=\"kp\" biasprm=\"0 -kp -kv\""],
+        ),
+        (
+            "<actuator><cylinder joint=\"j1\"/></actuator>",
+            &[
+                "robot.xml:3",
+                "<cylinder>",
+                "allowed: position, velocity, motor, general",
+            ],
+        ),
+    ];
+    for (element, texts) in cases {
+        let said = with(element);
+        let all = texts.iter().all(|text| said.contains(text));
+        assert!(all, "expected {texts:?} in: {said}");
+    }
+    let mut massless = folder();
+    massless.robot = massless.robot.replace("mass=\"0.5\" ", "");
+    assert!(massless.refused().contains("<inertial> without `mass`"));
+}
+
+#[test]
+fn rows_and_joints_of_other_lengths_and_rates_that_are_none_are_refused_with_their_place() {
+    let mut short = folder();
+    short.recording = short
+        .recording
+        .replace("\n0.50,1,fit,", "\n0.50,1,fit\n0.505,1,fit,");
+    let said = short.refused();
+    assert!(said.contains("recording.csv:52"), "{said}");
+    let mut wide = folder();
+    let columns = |line: &str| match line.starts_with("time_s") {
+        true => format!("{line},cmd2_rad,q2_rad\n"),
+        false => format!("{line},0.1,0.1\n"),
+    };
+    wide.recording = wide.recording.lines().map(columns).collect();
+    let said = wide.refused();
+    assert!(
+        said.contains("a column of joint 2") && said.contains("names 1 joints"),
+        "{said}"
+    );
+    for rate in [0.0, -100.0] {
+        let mut none = folder();
+        none.drives["command_rate_hz"] = rate.into();
+        let said = none.refused();
+        assert!(
+            said.contains("drives.json: command_rate_hz") && said.contains("allowed: above 0"),
+            "{said}"
+        );
+    }
+    let mut few = folder();
+    few.recording = few
+        .recording
+        .lines()
+        .take(12)
+        .map(|line| format!("{line}\n"))
+        .collect();
+    assert!(few.refused().contains("expected at least 20"));
+}
+
+#[test]
+fn a_joint_that_is_neither_commanded_nor_moved_is_told() {
+    let mut folder = folder();
+    folder.robot = folder.robot.replace(
+        "</body></worldbody>",
+        "<body name=\"hand\" pos=\"0.2 0 0\"><joint name=\"j2\" axis=\"0 1 0\" armature=\"0.01\"/>\
+         <inertial pos=\"0.05 0 0\" mass=\"0.1\" diaginertia=\"1e-4 1e-4 1e-4\"/></body></body></worldbody>",
+    );
+    let mut second = folder.drives["joints"][0].clone();
+    second["joint"] = "j2".into();
+    folder.drives["joints"].as_array_mut().unwrap().push(second);
+    let columns = |line: &str| match line.starts_with("time_s") {
+        true => format!("{line},cmd2_rad,q2_rad\n"),
+        false => format!("{line},0.1,0.1\n"),
+    };
+    folder.recording = folder.recording.lines().map(columns).collect();
+    let case = folder.written();
+    let store = tempfile::tempdir().unwrap();
+    let pipeline = root("pipelines/drives/pipeline.yaml");
+    let (case, store, pipeline) = (
+        case.path().display(),
+        store.path().display(),
+        pipeline.display(),
+    );
+    let answer = calib(
+        ".",
+        &format!("diagnose --set case={case} --store {store} {pipeline}"),
+    );
+    assert_eq!(answer.code, Some(0), "{}", answer.both());
+    let said = answer.both();
+    assert!(
+        said.contains("joint 2 rests") && said.contains("left out of `joints`"),
+        "{said}"
+    );
+}
+
 /// The folder with commands and angles in two files, each a list a row, on a clock of microseconds; `rows` of the commands are left out.
 fn in_lists(folder: &Folder, short: bool) -> TempDir {
     let case = tempfile::tempdir().unwrap();
@@ -341,10 +486,7 @@ fn commands_and_angles_come_as_lists_in_two_files_too() {
     let case = in_lists(&plain, false);
     let lists = diagnosed(case.path());
     assert_eq!(lists.code, Some(0), "{}", lists.err);
-    let one = tempfile::tempdir().unwrap();
-    put(one.path(), "robot.xml", &plain.robot);
-    put(one.path(), "drives.json", plain.drives.to_string());
-    put(one.path(), "recording.csv", &plain.recording);
+    let one = plain.written();
     let store = tempfile::tempdir().unwrap();
     let columns = diagnose(one.path(), store.path()).json();
     let rms = |document: &Value| document["before"]["fit_rms_mrad"].as_f64().unwrap();

@@ -116,6 +116,11 @@ pub fn diagnose(
         if searched.halved == HALVED {
             break answer;
         }
+        if let Some((finer, rest)) = searched.without_gears(&answer.after, options) {
+            whole.chain.step = finer.chain.step;
+            (searched, start) = (finer, rest);
+            continue;
+        }
         // Steps that serve the simulation as it is may be too long for what was found: a finding that explains no more than they err by may
         // be their error. Then they are halved, and what finer ones may still err by is noise.
         let found = searched.physics(&answer.after.inertia, &answer.after.set);
@@ -247,6 +252,13 @@ impl Drives {
                 }
             })
             .collect();
+        if let (Key::Cable(_), [stiffness, at_zero]) = (cell.key, &mut parameters[..]) {
+            let [k, moment] = [stiffness.value, at_zero.value];
+            let spread = |of: Option<f64>| of.unwrap_or_default() / k;
+            let rest = moment / k;
+            let sigma = spread(at_zero.sigma).hypot(rest * spread(stiffness.sigma));
+            (at_zero.value, at_zero.sigma) = (rest, at_zero.sigma.map(|_| sigma));
+        }
         if let Key::Coupling(_, by) = cell.key {
             parameters.push(DriveNumber {
                 name: "by joint".into(),

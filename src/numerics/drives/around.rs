@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// rad rms of a unit of amplitude: the amplitudes of the table of causes are those of metres at a tool.
 const UNIT: f64 = 10.0;
 /// Standard deviations of what noise alone makes of a joint's squared residual, above which causes with a memory are evaluated there.
-const ABOVE_NOISE: f64 = 4.0;
+const ABOVE_NOISE: f64 = 2.0;
 /// Share of the drive's error, rms, that is left at a joint whose gain may be far off.
 const FAR_OFF: f64 = 0.5;
 
@@ -31,6 +31,8 @@ pub struct Around {
     /// Base columns of each member.
     members: Vec<Vec<usize>>,
     precision: Vec<f64>,
+    /// Of the base's numbers from where they are expected.
+    distances: DVector<f64>,
     /// Residuals of fitted rows.
     freedom: f64,
     rolled: Vec<Rolled>,
@@ -231,6 +233,7 @@ impl Around {
             sums,
             own,
             members: (0..fit.set.len()).map(of_member).collect(),
+            distances: drives.distances(fit, &base),
             precision: base.precision,
             freedom: (drives.fitted().count() * n) as f64,
             rolled: columns
@@ -254,7 +257,10 @@ impl Around {
         let gram = self.own.gram_matrix();
         let lost = |of: usize| out.map_or(0.0, |member| gram[(of, nb + member)]);
         let scale = (fit.square / self.freedom).max(1.0);
-        let gradient = |of: usize| self.own.gradient[of] + lost(of);
+        // What is free already is pulled back to where it is expected: what it takes up beyond its tolerance a cell may explain.
+        let prior = |of: usize| self.precision[of] * scale / fit.share();
+        let gradient =
+            |of: usize| self.own.gradient[of] + lost(of) - prior(of) * self.distances[of];
         let square = self.own.square
             + out.map_or(0.0, |member| {
                 2.0 * self.own.gradient[nb + member] + lost(nb + member)
@@ -264,7 +270,7 @@ impl Around {
             (square, self.freedom),
             &DMatrix::from_fn(count, count, |i, k| gram[(kept[i], kept[k])]),
             DVector::from_fn(count, |i, _| gradient(kept[i])),
-            &DVector::from_fn(count, |i, _| self.precision[kept[i]] * scale),
+            &DVector::from_fn(count, |i, _| prior(kept[i])),
         );
         rows.square = rows.square.max(self.freedom);
         rows.independence = fit.share();

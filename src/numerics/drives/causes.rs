@@ -237,7 +237,7 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
         add(
             Key::TorqueLimit(j),
             &TORQUE_LIMIT,
-            [0.5, 0.7, 0.85]
+            [0.5, 0.7, 0.85, 0.93, 0.97]
                 .map(|w| at(&[(w * top).ln()], &[0.5]))
                 .to_vec(),
         );
@@ -276,27 +276,18 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
                 })
                 .to_vec(),
         );
-        let load = |both: bool| {
-            let mut shape = line(&[], &[0.05, 0.05]);
-            shape.columns = vec![vec![if both { 0.02 } else { 0.0 }, 0.02]];
-            if !both {
-                shape.usual[0] = 0.0;
-            }
-            shape
+        let load = Shape {
+            log_weight: -0.7,
+            columns: vec![vec![0.02, 0.0], vec![0.0, 0.02]],
+            ..line(&[], &[0.05, 0.05])
         };
-        for both in [true, false] {
-            let quarter = Shape {
-                log_weight: -1.4,
-                ..load(both)
-            };
-            add(Key::Load(j, both), &LOAD, vec![quarter.clone()]);
-            // A gear that locks itself is held by as much as its load is.
-            let wide = Shape {
-                usual: quarter.usual.iter().map(|usual| 6.0 * usual).collect(),
-                ..quarter
-            };
-            add(Key::GearLoad(j, both), &LOAD, vec![wide]);
-        }
+        // A gear that locks itself is held by as much as its load is.
+        let gear_load = Shape {
+            usual: load.usual.iter().map(|usual| 6.0 * usual).collect(),
+            ..load.clone()
+        };
+        add(Key::Load(j), &LOAD, vec![load]);
+        add(Key::GearLoad(j), &LOAD, vec![gear_load]);
         if p.friction > 0.0 {
             add(
                 Key::Presliding(j),
@@ -359,8 +350,8 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
                 .to_vec(),
         );
         let spring = 0.02 * p.kp.max(1e-6);
-        let mut cable = line(&[spring], &[2.0 * spring, 0.3]);
-        cable.columns = vec![vec![spring, 0.0]];
+        // Its torque at 0 rad is linear, where it rests is not.
+        let cable = line(&[spring, 0.3 * spring], &[2.0 * spring, 0.6 * spring]);
         add(Key::Cable(j), &CABLE, vec![cable]);
         for waves in RIPPLES {
             let start = vec![0.0, 0.0, f64::from(waves).ln()];

@@ -37,8 +37,9 @@ const STANDS: Patience = Patience {
 const REACH: f64 = 3.0;
 
 /// Model error of a cause, a share of the rms of its effect, and its degrees of freedom: friction, gears and integrators of real
-/// arms follow no formula to a hundredth.
+/// arms follow no formula to a hundredth; what a drive computes and how rigid bodies move is exact but for rounding, stamps and steps.
 const FORM_ERRS: f64 = 0.02;
+const EXACT_ERRS: f64 = 0.0005;
 const WAYS: f64 = 10.0;
 
 /// A fitted model.
@@ -234,7 +235,34 @@ impl Drives {
         if fit.set.is_empty() {
             return vec![1.0; n];
         }
-        let without = self.angles(&self.physics(&fit.inertia, &[]), Which::Fitted);
+        let exact: Vec<Accepted<Key>> = (fit.set.iter())
+            .filter(|one| one.cell.key.is_exact())
+            .cloned()
+            .collect();
+        let rolled =
+            |set: &[Accepted<Key>]| self.angles(&self.physics(&fit.inertia, set), Which::Fitted);
+        let nothing = rolled(&[]);
+        let mut errs = vec![0.0; n];
+        let mut add = |share: f64, with: &[f64], without: &[f64]| {
+            let by = share * share * fit.share() / WAYS;
+            let effects = self.effects(with, without).into_iter();
+            (errs.iter_mut().zip(effects)).for_each(|(err, effect)| *err += by * effect);
+        };
+        match exact.len() {
+            0 => add(FORM_ERRS, &fit.angles, &nothing),
+            count if count == fit.set.len() => add(EXACT_ERRS, &fit.angles, &nothing),
+            _ => {
+                let exact = rolled(&exact);
+                add(FORM_ERRS, &fit.angles, &exact);
+                add(EXACT_ERRS, &exact, &nothing);
+            }
+        }
+        errs.into_iter().map(|err| (1.0 + err).sqrt()).collect()
+    }
+
+    /// By joint, the whitened squared change between two simulations.
+    fn effects(&self, with: &[f64], without: &[f64]) -> Vec<f64> {
+        let n = self.chain.joints();
         let mut effects = vec![0.0; n];
         for row in self.fitted() {
             for (joint, effect) in effects.iter_mut().enumerate() {
@@ -242,7 +270,7 @@ impl Drives {
                 let [low, high] = self.usual[joint].range;
                 // Where the one or the other runs away no effect is larger than the motion.
                 let most = high - low;
-                let change = fit.angles[at] - without[at];
+                let change = with[at] - without[at];
                 let change = if change.is_finite() {
                     change.abs().min(most)
                 } else {
@@ -251,9 +279,7 @@ impl Drives {
                 *effect += (change / self.sigma[at]).powi(2);
             }
         }
-        let errs = FORM_ERRS * FORM_ERRS * fit.share() / WAYS;
-        let times = |effect: f64| (1.0 + errs * effect).sqrt();
-        effects.into_iter().map(times).collect()
+        effects
     }
 
     /// Fits inertials and a set's numbers from where they are; stops where evidence `least` is out of reach.
@@ -304,7 +330,7 @@ impl Drives {
             fit.doubt = self.doubt(&fit);
         }
         let first = if anew { Anew::All } else { Anew::Unknown };
-        // Of a trial the responses to torques in proportion to their numbers hold from the beginning, all others from the third look on.
+        // Of a trial the responses to torques in proportion to their numbers hold from the beginning, all others are made anew.
         let is_proportional = set.iter().all(|one| {
             let key = one.cell.key;
             fit.known(key, 0).is_some() || key.is_proportional()
@@ -344,7 +370,7 @@ impl Drives {
             };
             let hold = match anew {
                 true => again == Anew::All,
-                false => is_proportional || step > 1,
+                false => is_proportional,
             };
             let (mut by, mut moved) = (1.0, None);
             while by > patience.least {
@@ -498,7 +524,7 @@ impl Drives {
     }
 
     /// Of every number from where it is expected.
-    fn distances(&self, fit: &DriveFit, columns: &BaseColumns) -> DVector<f64> {
+    pub(crate) fn distances(&self, fit: &DriveFit, columns: &BaseColumns) -> DVector<f64> {
         let numbers = columns.numbers.iter().map(|(c, k)| {
             let one = &fit.set[*c];
             one.numbers[*k] - one.cell.shapes[one.shape].centre[*k]

@@ -35,10 +35,10 @@ pub enum Key {
     Coulomb(usize),
     /// Dry friction that falls with speed.
     Stribeck(usize),
-    /// Friction by the drive's torque; when driven back alone or both ways.
-    Load(usize, bool),
-    /// Friction by the torque that the gear transmits to the link; likewise.
-    GearLoad(usize, bool),
+    /// Friction by the drive's torque.
+    Load(usize),
+    /// Friction by the torque that the gear transmits to the link.
+    GearLoad(usize),
     /// Friction that bends before it slides.
     Presliding(usize),
     /// Friction that goes with time.
@@ -87,6 +87,26 @@ impl Key {
         )
     }
 
+    /// Whether it follows its formula exactly: a drive's arithmetic, or rigid bodies.
+    pub fn is_exact(self) -> bool {
+        matches!(
+            self,
+            Self::Delay(_)
+                | Self::Offset(_)
+                | Self::Hold
+                | Self::Gain(..)
+                | Self::Damping(..)
+                | Self::Rotor(_)
+                | Self::DeadBand(_)
+                | Self::TorqueLimit(_)
+                | Self::SpeedLimit(_)
+                | Self::Payload
+                | Self::LinkMass(_)
+                | Self::LinkCentre(_)
+                | Self::Gravity
+        )
+    }
+
     /// Whether what it changes has a memory, so that its numbers are fitted by roll-outs of their own.
     pub fn has_memory(self) -> bool {
         matches!(
@@ -127,10 +147,8 @@ impl Key {
             Self::Viscous(j) => joints[j].damping += x[0],
             Self::Coulomb(j) => joints[j].friction += x[0],
             Self::Stribeck(j) => joints[j].stribeck = [x[0], x[1].exp()],
-            Self::Load(j, both) => joints[j].load_friction = [if both { x[0] } else { 0.0 }, x[1]],
-            Self::GearLoad(j, both) => {
-                joints[j].gear_friction = [if both { x[0] } else { 0.0 }, x[1]];
-            }
+            Self::Load(j) => joints[j].load_friction = [x[0], x[1]],
+            Self::GearLoad(j) => joints[j].gear_friction = [x[0], x[1]],
             Self::Presliding(j) => joints[j].presliding = x[0].exp(),
             Self::WarmUp(j) => {
                 joints[j].warm_up = [x[0], x[2].exp()];
@@ -160,7 +178,7 @@ impl Key {
                 let rest = if whole == 0.0 {
                     0.0
                 } else {
-                    (k * rest + x[0] * x[1]) / whole
+                    (k * rest + x[1]) / whole
                 };
                 joints[j].spring = [whole, rest];
             }
@@ -243,8 +261,8 @@ impl Key {
             | Self::Viscous(j)
             | Self::Coulomb(j)
             | Self::Stribeck(j)
-            | Self::Load(j, _)
-            | Self::GearLoad(j, _)
+            | Self::Load(j)
+            | Self::GearLoad(j)
             | Self::Presliding(j)
             | Self::WarmUp(j)
             | Self::Backlash(j, _)
@@ -303,9 +321,7 @@ impl Key {
             (Self::Gain(a, b), Self::Gain(c, d)) | (Self::Damping(a, b), Self::Damping(c, d)) => {
                 (a, b) == (c, d)
             }
-            (Self::Load(a, _) | Self::GearLoad(a, _), Self::Load(b, _) | Self::GearLoad(b, _)) => {
-                a == b
-            }
+            (Self::Load(a) | Self::GearLoad(a), Self::Load(b) | Self::GearLoad(b)) => a == b,
             (
                 Self::Backlash(a, _) | Self::Elasticity(a),
                 Self::Backlash(b, _) | Self::Elasticity(b),

@@ -3,7 +3,7 @@
 use crate::chain::Bodies;
 use nalgebra::Point3;
 
-/// A function of one variable by its values at even knots, which is held beyond them.
+/// A function of one variable by its values at even knots, smooth between them (Catmull and Rom, 1974), which is held beyond them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     /// What it follows.
@@ -44,8 +44,18 @@ impl Curve {
         let last = self.values.len() - 1;
         let at = ((x - self.knots[0]) / self.knots[1]).clamp(0.0, last as f64);
         let k = (at as usize).min(last.saturating_sub(1));
-        let share = at - k as f64;
-        self.values[k] * (1.0 - share) + self.values[(k + 1).min(last)] * share
+        let t = at - k as f64;
+        let value = |k: usize| self.values[k.min(last)];
+        let (a, b) = (value(k), value(k + 1));
+        // At an end the curve goes on as it begins.
+        let before = if k > 0 { value(k - 1) } else { 2.0 * a - b };
+        let after = if k + 2 <= last {
+            value(k + 2)
+        } else {
+            2.0 * b - a
+        };
+        let (m, n) = (0.5 * (b - before), 0.5 * (after - a));
+        a + t * (m + t * (3.0 * (b - a) - 2.0 * m - n + t * (2.0 * (a - b) + m + n)))
     }
 }
 
@@ -372,5 +382,45 @@ impl Joint {
             }
         }
         out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_goes_through_its_knots_smoothly_and_is_held_beyond_them() {
+        let value = |values: &[f64], x: f64| {
+            let curve = Curve {
+                over: Over::Time,
+                knots: [1.0, 0.5],
+                values: values.to_vec(),
+                dry: false,
+            };
+            let none = Motion {
+                q: &[],
+                v: &[],
+                middle: &[],
+                ahead: &[],
+                a: &[],
+                time: x,
+                driven: &[],
+                load: &[],
+            };
+            curve.value(&none)
+        };
+        let line = [1.0, 2.0, 3.0, 4.0];
+        for (x, expected) in [(0.0, 1.0), (1.2, 1.4), (2.1, 3.2), (9.0, 4.0)] {
+            assert!((value(&line, x) - expected).abs() < 1e-12, "{x}");
+        }
+        // Of a wave of six knots a turn a broken line errs by 13 %, the curve by a few.
+        let turn = std::f64::consts::TAU / 6.0;
+        let wave: Vec<f64> = (0..13).map(|k| (turn * f64::from(k)).sin()).collect();
+        for step in 0..40 {
+            let at = 3.0 + 0.15 * f64::from(step);
+            let error = value(&wave, 1.0 + 0.5 * at) - (turn * at).sin();
+            assert!(error.abs() < 0.03, "{at}: {error}");
+        }
     }
 }

@@ -5,7 +5,7 @@ use crate::causes::Usual;
 use crate::chain::Chain;
 use crate::fit::DriveFit;
 use crate::key::Key;
-use crate::physics::Physics;
+use crate::physics::{Over, Physics};
 use crate::recording::{Recording, Trajectory};
 use crate::rollout::{Which, roll};
 use crate::steps::longest;
@@ -217,6 +217,38 @@ impl Drives {
     }
 }
 
+/// The cell with a name that a free curve may be, with its numbers as the curve has them, as the first of scanned cells: dry friction of a curve
+/// over the own speed, a spring of one over the own angle. Far from where a linear scan stands it hardly sees them.
+fn by_its_law(
+    member: &Accepted<Key>,
+    usual: &[Usual],
+    scanned: &[Scanned<Key>],
+) -> Option<Scanned<Key>> {
+    let values = &member.numbers;
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let (key, numbers) = match member.cell.key {
+        Key::Unknown(joint, Over::Speed(by), true) if by == joint => {
+            (Key::Coulomb(joint), vec![mean])
+        }
+        Key::Unknown(joint, Over::Angle(by), false) if by == joint => {
+            let [from, to] = usual[joint].range;
+            let middle = 0.5 * (count - 1.0);
+            let from_middle = |k: usize| k as f64 - middle;
+            let slope: f64 = (0..values.len()).map(|k| from_middle(k) * values[k]).sum();
+            let square: f64 = (0..values.len()).map(|k| from_middle(k).powi(2)).sum();
+            let slope = slope / square * (count - 1.0) / (to - from);
+            let at_zero = mean - slope * 0.5 * (from + to);
+            (Key::Cable(joint), vec![-slope, at_zero])
+        }
+        _ => return None,
+    };
+    let is_it = |one: &&Scanned<Key>| one.accepted.cell.key == key;
+    let mut named = scanned.iter().find(is_it)?.clone();
+    (named.accepted.numbers, named.log_odds) = (numbers, f64::INFINITY);
+    Some(named)
+}
+
 /// What the simulation as it is does.
 fn usual(chain: &Chain, base: &Physics, recording: &Recording) -> Vec<Usual> {
     let n = chain.joints();
@@ -278,7 +310,13 @@ impl Problem for Drives {
     }
 
     fn scan(&self, fit: &DriveFit, around: &Around, out: Option<usize>) -> Vec<Scanned<Key>> {
-        around.scan(fit, out)
+        let mut scanned = around.scan(fit, out);
+        if let Some(named) =
+            out.and_then(|member| by_its_law(&fit.set[member], &self.usual, &scanned))
+        {
+            scanned.insert(0, named);
+        }
+        scanned
     }
 
     fn fit(&self, set: &[Accepted<Key>], before: Option<&DriveFit>, least: f64) -> DriveFit {

@@ -53,6 +53,8 @@ const GAP: f64 = 12.0;
 pub const PAUSE: f64 = 0.5;
 /// s between two recordings, whose clocks do not say it.
 const BREAK: f64 = 1.0;
+/// Share of the period by which a command may be stamped later than it is taken.
+const EARLY: f64 = 0.2;
 /// s at the beginning in which a trajectory rests.
 const REST: f64 = 0.4;
 /// Steps of the encoder, plus standard deviations of the noise, that the angles of a joint at rest span at most.
@@ -131,31 +133,43 @@ impl Recording {
         Ok(())
     }
 
-    /// Fails where a joint never moves though it is commanded to; `label` names the recordings.
-    pub fn check_motion(&self, label: &str) -> Result<()> {
+    /// Span of the commands of a joint, and whether its angles never leave where they begin.
+    fn motion(&self, joint: usize) -> (f64, bool) {
         let n = self.joints();
-        let still: Vec<String> = (0..n)
-            .filter(|joint| {
-                let all = || (0..self.rows()).map(|row| self.angle[row * n + joint]);
-                let (low, high) = (
-                    all().fold(f64::MAX, f64::min),
-                    all().fold(f64::MIN, f64::max),
-                );
-                let sent = || (0..self.rows()).map(|row| self.command[row * n + joint]);
-                let asked = sent().fold(f64::MIN, f64::max) - sent().fold(f64::MAX, f64::min);
-                high - low < 3.0 * self.encoder[*joint].max(self.noise[*joint])
-                    && asked > 10.0 * self.encoder[*joint].max(1e-3)
-            })
-            .map(|joint| (joint + 1).to_string())
-            .collect();
+        let span = |all: &[f64]| {
+            let of_joint = || all.iter().skip(joint).step_by(n).copied();
+            of_joint().fold(f64::MIN, f64::max) - of_joint().fold(f64::MAX, f64::min)
+        };
+        let still = 3.0 * self.encoder[joint].max(self.noise[joint]);
+        (span(&self.command), span(&self.angle) < still)
+    }
+
+    /// Joints, from 1, that never move though they are commanded to, or that neither are.
+    fn unmoved(&self, commanded: bool) -> String {
+        let is_one = |joint: &usize| {
+            let (sent, is_still) = self.motion(*joint);
+            is_still && (sent > 10.0 * self.encoder[*joint].max(1e-3)) == commanded
+        };
+        let all = (0..self.joints()).filter(is_one);
+        let all: Vec<String> = all.map(|joint| (joint + 1).to_string()).collect();
+        all.join(", ")
+    }
+
+    /// Fails where a joint never moves though it is commanded to; `label` names the recordings. Joints that rest are told, in a sentence.
+    pub fn check_motion(&self, label: &str) -> Result<Option<String>> {
+        let still = self.unmoved(true);
         if !still.is_empty() {
             let message = format!(
-                "joint {} never moves though it is commanded to; is its column the right one? A joint that is held is left out of `joints`",
-                still.join(", ")
+                "joint {still} never moves though it is commanded to; is its column the right one? A joint that is held is left out of `joints`"
             );
             return Err(Error::data(label, message));
         }
-        Ok(())
+        let rests = Some(self.unmoved(false)).filter(|rests| !rests.is_empty());
+        Ok(rests.map(|rests| {
+            format!(
+                "{label}: joint {rests} rests, so that nothing is learnt of its drive and friction; a joint that is held is left out of `joints`"
+            )
+        }))
     }
 
     /// Puts another recording of the same drives behind this one; its clock goes on after ours.
@@ -292,22 +306,16 @@ impl Recording {
             time.push(self.time[row]);
             value.extend_from_slice(&self.command[row * n..(row + 1) * n]);
         }
+        let mut lasts: Vec<f64> = counts.iter().map(|count| count * self.period).collect();
         if hold > 0.0 {
-            // Commands that come between two that are taken are lost.
-            let (mut taken, mut last) = (0, f64::MIN);
-            for k in 0..time.len() {
-                let slot = ((time[k] - time[0]) / hold + 1e-6).floor();
-                if slot > last {
-                    (taken, last) = (k, slot);
-                }
-                value.copy_within(taken * n..(taken + 1) * n, k * n);
-            }
+            (time, value) = self.taken(trajectory, &time, &value, hold);
+            lasts = vec![hold; time.len()];
         }
         let mut speed = vec![0.0; value.len()];
         for k in 1..time.len() {
             for joint in 0..n {
                 speed[k * n + joint] =
-                    (value[k * n + joint] - value[(k - 1) * n + joint]) / (counts[k] * self.period);
+                    (value[k * n + joint] - value[(k - 1) * n + joint]) / lasts[k];
             }
         }
         let summed = |of: &[f64]| {
@@ -328,6 +336,31 @@ impl Recording {
             speed,
             joints: n,
         }
+    }
+
+    /// Times and commands of a drive whose own clock runs on through the recording and takes at each tick the last command that was sent.
+    fn taken(
+        &self,
+        trajectory: &Trajectory,
+        sent: &[f64],
+        value: &[f64],
+        hold: f64,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let (n, began) = (self.joints(), trajectory.began);
+        let (first, last) = (sent[0], sent[sent.len() - 1]);
+        let slot = ((first - began) / hold + 1e-6).floor();
+        let ticks = (1..).map(|k| began + (slot + f64::from(k)) * hold);
+        let ticks = ticks.take_while(|tick| *tick <= last);
+        let (mut time, mut taken, mut row) = (vec![first], value[..n].to_vec(), 0);
+        for tick in ticks {
+            // Stamps of rows that are due at a tick may be a little later.
+            while row + 1 < sent.len() && sent[row + 1] <= tick + EARLY * self.period {
+                row += 1;
+            }
+            time.push(tick);
+            taken.extend_from_slice(&value[row * n..(row + 1) * n]);
+        }
+        (time, taken)
     }
 
     /// A command between rows `row - 1` and `row`, by the cubic through the neighbours (Catmull and Rom).
@@ -409,6 +442,25 @@ mod tests {
         let (angle, speed) = recording.start(&recording.trajectories[0]);
         assert!((angle[0] - 0.1).abs() < 1e-9 && (speed[0] - 0.8).abs() < 1e-6);
         assert!((angle[1] - 0.2).abs() < 1e-12 && speed[1] == 0.0);
+    }
+
+    #[test]
+    fn a_drive_that_takes_commands_rarely_does_so_at_ticks_of_its_own_clock() {
+        let mut recording = recording();
+        recording.trajectories[0].rows = 100..200;
+        let whole = &recording.trajectories[0];
+        let command = |row: usize| recording.command[2 * row];
+        // From the beginning of the recording on every 30 ms: 1.02 s, 1.05 s ..
+        let held = recording.commands(whole, 0.03);
+        let close =
+            |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9;
+        assert!(close(held.mean(0, 1.015, 1.016, 0), [command(100), 0.0]));
+        let rate = (command(102) - command(100)) / 0.03;
+        assert!(close(held.mean(0, 1.025, 1.026, 0), [command(102), rate]));
+        // Between two rows the last one that was sent.
+        let held = recording.commands(whole, 0.015);
+        let rate = (command(103) - command(102)) / 0.015;
+        assert!(close(held.mean(0, 1.036, 1.037, 0), [command(103), rate]));
     }
 
     #[test]

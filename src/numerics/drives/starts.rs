@@ -54,6 +54,29 @@ mod tests {
     use calib_engine::Problem;
 
     #[test]
+    fn what_inertials_take_up_beyond_their_tolerance_is_seen_as_a_cell_of_their_own() {
+        let (chain, base, mut recording) = motion();
+        let tolerance = InertialTolerance {
+            mass_relative: 0.02,
+            centre: 1e-3,
+            inertia_relative: 0.02,
+        };
+        let drives = Drives::new(chain, base.clone(), recording.clone(), tolerance);
+        let mut shifted = base.clone();
+        for axis in 0..3 {
+            shifted.bodies.links[1].centre[axis] += 0.02;
+        }
+        recording.angle = drives.angles(&shifted, Which::All);
+        let measured = Drives::new(drives.chain.clone(), base, recording, tolerance);
+        let fit = measured.fit(&[], None, f64::NEG_INFINITY);
+        let around = measured.around(&fit, None);
+        let scanned = measured.scan(&fit, &around, None);
+        let is_it = |one: &&calib_engine::Scanned<Key>| one.accepted.cell.key == Key::LinkCentre(1);
+        let odds = scanned.iter().find(is_it).map(|one| one.log_odds);
+        assert!(odds.is_some_and(|odds| odds > 10.0), "{odds:?}");
+    }
+
+    #[test]
     fn a_cause_without_a_small_size_begins_where_a_roll_out_says() {
         let (chain, base, mut recording) = motion();
         let tolerance = InertialTolerance {

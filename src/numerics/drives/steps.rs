@@ -3,11 +3,12 @@
 
 use crate::chain::{Chain, STEP};
 use crate::fit::DriveFit;
+use crate::key::Key;
 use crate::physics::Physics;
 use crate::problem::Drives;
 use crate::recording::Recording;
 use crate::rollout::{Which, roll};
-use calib_engine::Problem;
+use calib_engine::{Accepted, Options, Problem};
 
 /// Longer steps that are tried, s, and the share of the noise, rms, that is the same motion.
 const LONGER: [f64; 2] = [2.5e-3, 1.7e-3];
@@ -90,6 +91,31 @@ impl Drives {
         for (at, sigma) in self.sigma.iter_mut().enumerate() {
             *sigma = sigma.hypot(0.5 * coarseness.way[at % n]);
         }
+    }
+
+    /// Where steps are shorter with a gear that yields than without: the same with those of the gear in either case, and the set without gears
+    /// that explain nothing any more; none where all gears do.
+    pub(crate) fn without_gears(
+        &self,
+        fit: &DriveFit,
+        options: &Options,
+    ) -> Option<(Self, Vec<Accepted<Key>>)> {
+        if self.chain.step <= self.chain.geared_step {
+            return None;
+        }
+        let mut fine = self.clone();
+        fine.chain.step = fine.chain.geared_step;
+        let explains = |member: usize| {
+            let mut rest = fit.set.clone();
+            rest.remove(member);
+            let without = fine.fitted_with(&rest, Some(fit), false, f64::NEG_INFINITY);
+            let share = fit.share();
+            fine.log_evidence(fit, share) - fine.log_evidence(&without, share) > options.leaves
+        };
+        let members = 0..fit.set.len();
+        let stays = |member: &usize| !fit.set[*member].cell.key.is_gear() || explains(*member);
+        let rest: Vec<Accepted<Key>> = members.filter(stays).map(|k| fit.set[k].clone()).collect();
+        (rest.len() < fit.set.len()).then_some((fine, rest))
     }
 
     /// Whether findings of such ln odds explain more than steps err by, whose halves move a fit by so large a whitened square.

@@ -13,11 +13,11 @@ use super::sliding::unit_of;
 use super::sweep::{SweptColumns, value_of};
 use super::types::{ContactEvent, TorqueFinding};
 use crate::criteria::cells::{MISLED, RIVAL};
-use calib_engine::log_sum;
 use crate::diagnose::{Evidence, Probabilities, RivalCause};
 use crate::effect::Place;
 use crate::estimate::tail;
 use crate::statistics::nearest;
+use calib_engine::log_sum;
 use std::borrow::Cow;
 
 /// A set fitted with the base, and what is not known of its numbers.

@@ -8,8 +8,8 @@ use super::solve::SolvedTorques;
 use crate::criteria::fleet::LEAST_EVIDENCE;
 use crate::criteria::torque::PER_METRE;
 use crate::diagnose::table::rms_size;
-use calib_engine::{AMPLITUDES, evidence_at, log_sum, log_sums};
 use crate::diagnose::{CellAnswer, GivenCell};
+use calib_engine::{AMPLITUDES, evidence_at, log_sum, log_sums};
 use std::collections::BTreeMap;
 
 /// What all cells say given some, and what each of those says and its rivals say in its place; sizes in Nm.

@@ -14,6 +14,10 @@ pub struct Options {
     pub exchanges: f64,
     /// Cells that are fitted in a round: a linear scan ranks, only a fit decides.
     pub tried: usize,
+    /// Cells of one name and place among them: forms of a cause that a linear scan hardly tells apart.
+    pub forms: usize,
+    /// Trials that come near the best are fitted to the end, so many in all, before one joins.
+    pub last: usize,
     /// Exchanges at most: each is for the better, so none comes twice.
     pub exchanged: usize,
     /// Whether one cell may replace all members of a place at once: where causes are fitted with numbers of their own, several can imitate one.
@@ -32,6 +36,8 @@ impl Default for Options {
             exchanges: 0.5,
             exchanged: 8,
             tried: 8,
+            forms: 1,
+            last: 1,
             regroups: true,
             most: 12,
             told: 5e-3,
@@ -57,6 +63,9 @@ const SEVERAL: usize = 2;
 /// ln by which a linear scan may be wrong, and the share of it: what is further behind is not fitted.
 const BLUR: f64 = 20.0;
 const BLUR_SHARE: f64 = 0.5;
+
+/// Share of the gain by which a trial may be behind that is fitted to the end before one joins.
+const NEAR: f64 = 0.3;
 
 /// Cells that may join in a search, of those that may stand.
 const ROUNDS: usize = 2;
@@ -99,7 +108,7 @@ fn without<K: Clone>(set: &[Accepted<K>], member: usize) -> Vec<Accepted<K>> {
     [&set[..member], &set[member + 1..]].concat()
 }
 
-/// Cells of a scan that a set allows, the first of each name and place, as many as are tried; `least` is the linear evidence below which
+/// Cells of a scan that a set allows, the first ones of each name and place, as many as are tried; `least` is the linear evidence below which
 /// none is.
 fn candidates<P: Problem>(
     problem: &P,
@@ -117,7 +126,9 @@ fn candidates<P: Problem>(
     let mut kept: Vec<Scanned<P::Key>> = Vec::new();
     for one in scanned.into_iter().filter(free) {
         let is_same = |other: &&Scanned<P::Key>| problem.is_same(&other.accepted, &one.accepted);
-        if one.log_odds > least.max(options.joins) && kept.iter().find(is_same).is_none() {
+        if one.log_odds > least.max(options.joins)
+            && kept.iter().filter(is_same).count() < options.forms
+        {
             kept.push(one);
         }
         if kept.len() == options.tried {
@@ -180,6 +191,36 @@ fn compared_at<P: Problem>(problem: &P, fit: &P::Fit, trials: &[Trial<P>]) -> f6
     of_best.max(problem.independence(fit))
 }
 
+/// The likeliest of trials, best first, fitted to the end, and the share of independent rows at which it is compared: trials are not, so that
+/// one that comes near may be the better one.
+fn likeliest<P: Problem>(
+    problem: &P,
+    from: &P::Fit,
+    tried: Vec<Trial<P>>,
+    independence: f64,
+    options: &Options,
+) -> Option<(Trial<P>, f64)> {
+    let now = problem.log_evidence(from, independence);
+    let best = tried.first()?.log;
+    let comes_near = |trial: &Trial<P>| best - trial.log <= NEAR * (best - now).max(0.0);
+    let near: Vec<Trial<P>> = tried
+        .into_iter()
+        .filter(comes_near)
+        .take(options.last)
+        .collect();
+    let settled = near.into_par_iter().map(|trial| Trial {
+        fit: problem.settled(&trial.fit),
+        ..trial
+    });
+    let mut all: Vec<Trial<P>> = settled.collect();
+    let independence = compared_at(problem, from, &all);
+    for trial in &mut all {
+        trial.log = problem.log_evidence(&trial.fit, independence);
+    }
+    let best = all.into_iter().max_by(|a, b| a.log.total_cmp(&b.log))?;
+    Some((best, independence))
+}
+
 /// The new member of a trial as fitted; none where it is not in the fit.
 fn standing<P: Problem>(problem: &P, trial: &Trial<P>) -> Option<Accepted<P::Key>> {
     let mut set = problem.set(&trial.fit).into_iter().rev();
@@ -216,17 +257,19 @@ fn search<P: Problem>(
                 trial.log - now
             ));
         }
-        let best = tried.into_iter().next();
-        let Some(best) = best.filter(|best| best.log - now >= options.joins) else {
+        let strong = tried
+            .first()
+            .is_some_and(|best| best.log - now >= options.joins);
+        let best = strong.then(|| likeliest(problem, &stand.fit, tried, independence, options));
+        let Some((best, _)) = best.flatten() else {
             break;
         };
         tell(format!(
             "{} at {} joins",
             best.cell.cause.name, best.cell.place
         ));
-        let fit = problem.settled(&best.fit);
-        let newest = problem.set(&fit).len().saturating_sub(1);
-        let fit = revised(problem, fit, newest, options, tell);
+        let newest = problem.set(&best.fit).len().saturating_sub(1);
+        let fit = revised(problem, best.fit, newest, options, tell);
         if !problem.is_accurate(&fit) {
             return Stand {
                 fit,
@@ -325,14 +368,12 @@ fn grouped<P: Problem>(problem: &P, stand: &Stand<P>, options: &Options) -> Opti
         let least = problem.log_evidence(&without, problem.independence(&without));
         let near = |first: f64| least + (1.0 - BLUR_SHARE) * (first - least);
         let (tried, compared) = trials(problem, &without, &rest, asked, least, near);
+        let Some((best, compared)) = likeliest(problem, &without, tried, compared, options) else {
+            continue;
+        };
         let compared = compared.max(problem.independence(&stand.fit));
         let of = |fit: &P::Fit| problem.log_evidence(fit, compared);
-        let best = tried
-            .into_iter()
-            .max_by(|a, b| of(&a.fit).total_cmp(&of(&b.fit)));
-        if let Some(best) = best
-            && of(&best.fit) - of(&stand.fit) > options.exchanges
-        {
+        if of(&best.fit) - of(&stand.fit) > options.exchanges {
             return Some(Change::of(best, &format!("all at {place}")));
         }
     }

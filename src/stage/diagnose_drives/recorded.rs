@@ -78,7 +78,8 @@ impl DiagnoseDrives {
             let message = format!("no row of {label} is left to fit; to fit: {to_fit}");
             return Err(Error::data("with.on", message));
         }
-        recording.check_motion(&label)?;
+        let rests = recording.check_motion(&label)?;
+        rests.iter().for_each(|rests| context.warn(rests));
         Ok(recording)
     }
 

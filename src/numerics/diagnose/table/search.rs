@@ -35,6 +35,7 @@ fn options() -> Options {
         regroups: false,
         most: *COMPONENTS,
         told: *RIVAL,
+        ..Options::default()
     }
 }
 
