@@ -86,7 +86,7 @@ mod tests {
         let others: Vec<&str> = CAUSES
             .iter()
             .filter(|cause| cause.name != "unknown" && !COLUMNS.contains(&cause.follows))
-            .map(|cause| cause.name)
+            .map(|cause| cause.name.as_ref())
             .collect();
         assert_eq!(others, Vec::<&str>::new());
     }

@@ -197,7 +197,10 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             }
         }
         let any = !fresh.is_empty();
-        self.extend(fresh);
+        if any {
+            self.firm = Mutex::default();
+            self.extend(fresh);
+        }
         any
     }
 

@@ -386,7 +386,16 @@ struct PartCache {
 }
 
 impl PartProducts {
-    /// Computes what is missing for some components, and forgets what is too much.
+    /// Forgets all where that is too much; nobody may be between two questions.
+    pub(crate) fn forget(&self) {
+        if let Ok(mut cache) = self.0.write()
+            && cache.pairs.len() > 20_000
+        {
+            *cache = PartCache::default();
+        }
+    }
+
+    /// Computes what is missing for some components.
     pub(crate) fn know<'c>(
         &self,
         components: impl Iterator<Item = &'c Component>,
@@ -396,9 +405,6 @@ impl PartProducts {
         let Ok(mut cache) = self.0.write() else {
             return;
         };
-        if cache.pairs.len() > 20_000 {
-            *cache = PartCache::default();
-        }
         for (i, a) in components.iter().enumerate() {
             let along = cache.along.entry(a.id);
             along.or_insert_with(|| Arc::new(frame.along(view(&a.part))));

@@ -46,6 +46,7 @@ impl Problem for CauseTable<'_, '_> {
 
     /// What was unlikely before is asked again when the likely cells are used up.
     fn around(&self, fit: &StandingComponents, before: Option<&CellScan>) -> CellScan {
+        self.parts.forget();
         let state = self.state(&fit.components, Some(fit.kappa));
         let numbers: usize = fit.components.iter().map(|one| one.part.ncols()).sum();
         // So many numbers describe rows and explain nothing.
