@@ -24,7 +24,7 @@ use std::path::PathBuf;
 /// Of a diagnosis of torques URDF carries viscous and Coulomb friction and the identified inertials, MJCF rotor inertias and drives too; what
 /// they cannot carry (Stribeck friction, friction of load, ripple) is listed with its size. All of it with sigma is in `dynamics`.
 ///
-/// Of a diagnosis of drives MJCF and `isaac` carry gains, damping, armature, friction, limits and delay, JSON all of it; `mjcf-control` is Python
+/// Of a diagnosis of drives MJCF and `isaac` carry gains, damping, armature, friction, limits and delay, JSON all of it; `mjcf_control` is Python
 /// beside the MJCF for what MuJoCo's model cannot hold.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]

@@ -44,7 +44,7 @@ pub(crate) const DRIVE_FORMATS: &[DriveFormat] = &[
         text: mjcf,
     },
     DriveFormat {
-        name: "mjcf-control",
+        name: "mjcf_control",
         help: "Python beside the MJCF of diagnosed drives: what MuJoCo's model cannot hold, put in before every step",
         carries: &[],
         text: control,
@@ -128,7 +128,7 @@ impl DriveExport {
             )
         }));
         if self.format.name == "mjcf" && self.left_out().next().is_some() {
-            lines.push("what is not carried is in the Python of `--format mjcf-control`".into());
+            lines.push("what is not carried is in the Python of `--format mjcf_control`".into());
         }
         Ok(lines)
     }

@@ -148,9 +148,9 @@ fn drives_are_exported_to_mujoco_isaac_and_json_with_what_was_found() {
         mjcf.contains("mrad rms before") && !mjcf.contains("not carried"),
         "{mjcf}"
     );
-    let control = of_the_example("export --quiet --format mjcf-control").out;
+    let control = of_the_example("export --quiet --format mjcf_control").out;
     assert!(
-        control.starts_with("# calib export: format mjcf-control")
+        control.starts_with("# calib export: format mjcf_control")
             && control.contains("NAMES = [\"pan\", \"lift\", \"elbow\"]")
             && control.contains("\"torque_limit\": [4.0, 4.0, 4.0]")
             && !control.contains("{{"),
@@ -171,7 +171,7 @@ fn drives_are_exported_to_mujoco_isaac_and_json_with_what_was_found() {
     assert!(
         refused
             .err
-            .contains("allowed: mjcf, mjcf-control, isaac, json"),
+            .contains("allowed: mjcf, mjcf_control, isaac, json"),
         "{}",
         refused.err
     );

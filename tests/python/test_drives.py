@@ -54,7 +54,7 @@ def is_carried(case, tmp_path):
     """The residual in MuJoCo is within 5 % of the stated one: with the Python beside the model, and of the model alone, but for what its head
     says that it does not carry."""
     document = json.loads(calib("diagnose", case, tmp_path / "store", "--json"))
-    text, control = (calib("export", case, tmp_path / "store", "--format", name) for name in ("mjcf", "mjcf-control"))
+    text, control = (calib("export", case, tmp_path / "store", "--format", name) for name in ("mjcf", "mjcf_control"))
     drives = json.loads((case / "drives.json").read_text())
     with open(case / "recording.csv") as file:
         rows = list(csv.DictReader(file))

@@ -109,7 +109,7 @@ def in_mujoco(calib, folder, recordings, stated):
         return done.stdout if done.returncode == 0 else sys.exit(done.stderr)
 
     drives = json.loads((folder / "drives.json").read_text())
-    text, control = exported("mjcf"), exported("mjcf-control")
+    text, control = exported("mjcf"), exported("mjcf_control")
     errors = []
     for time, command, angle, fitted in recordings:
         if not fitted.all():

@@ -1,7 +1,8 @@
 //! Folds of the rows to fit: how well poses are predicted by a fit that did not see them. Rows that are held out for validation take no part.
 
-use crate::criteria::judge::FOLDS;
+use crate::criteria::judge::{CLEARLY, FOLDS};
 use crate::estimate::{FoldKind, NearbyFits, Session, dealt, gather};
+use crate::linear::mean_square;
 use crate::round::{EstimatedCause, FitState, Fitter, with_causes};
 use std::ops::Range;
 
@@ -100,32 +101,53 @@ pub(crate) fn fold_error(now: &FitState, fitter: &Fitter) -> Option<f64> {
     Some(rms(&session, &folds, &errors))
 }
 
-/// Causes of findings without which stretches of a path are predicted better, taken out one finding after the other, the worst first; none where
-/// rows follow no path.
+/// Causes of findings that stretches of a path do not confirm: all findings where the stretches are not predicted clearly better with them
+/// than without any, else one after the other, the worst first; none where rows follow no path.
 pub(crate) fn unconfirmed(state: &FitState, found: &[Vec<usize>], fitter: &Fitter) -> Vec<usize> {
-    let mut out: Vec<usize> = Vec::new();
-    let mut left: Vec<&Vec<usize>> = found.iter().collect();
-    let Some(mut now) = fitter.dense.then(|| fold_error(state, fitter)).flatten() else {
-        return out;
+    let stretches = || fitter.dense.then(|| folds(state, fitter)).flatten();
+    let Some(folds) = stretches() else {
+        return Vec::new();
     };
+    // Mean squared error of each stretch without some causes.
+    let without = |out: &[usize]| -> Vec<f64> {
+        let kept = (0..state.causes.len()).filter(|i| !out.contains(i));
+        let kept = kept.map(|i| state.causes[i].clone()).collect();
+        let fit = fitter.fit(&state.model, kept);
+        let errors = fit.session(fitter).without_each(&folds, fitter.scale);
+        errors.iter().map(|fold| mean_square(fold)).collect()
+    };
+    let mut out: Vec<usize> = Vec::new();
+    let mut now = without(&out);
+    let all = found.concat();
+    if !all.is_empty() && !is_clearly_less(&now, &without(&all)) {
+        return all;
+    }
+    let mut left: Vec<&Vec<usize>> = found.iter().collect();
     loop {
-        let without = |members: &Vec<usize>| {
-            let kept = (0..state.causes.len()).filter(|i| !out.contains(i) && !members.contains(i));
-            let kept = kept.map(|i| state.causes[i].clone()).collect();
-            fold_error(&fitter.fit(&state.model, kept), fitter)
-        };
         let errors = left
             .iter()
-            .map(|members| without(members).unwrap_or(f64::INFINITY));
-        let best = errors.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-        match best.filter(|(_, error)| *error <= now) {
-            Some((at, error)) => {
-                now = error;
+            .map(|members| without(&[&out[..], members].concat()));
+        let mean = |errors: &[f64]| errors.iter().sum::<f64>();
+        let best = errors
+            .enumerate()
+            .min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)));
+        match best.filter(|(_, errors)| !is_clearly_less(&now, errors)) {
+            Some((at, errors)) => {
+                now = errors;
                 out.extend(left.remove(at));
             }
             None => return out,
         }
     }
+}
+
+/// Whether some squared errors are less than others by more than twice the standard error of the mean of their differences.
+fn is_clearly_less(some: &[f64], others: &[f64]) -> bool {
+    let gains: Vec<f64> = some.iter().zip(others).map(|(a, b)| b - a).collect();
+    let count = gains.len().max(2) as f64;
+    let mean = gains.iter().sum::<f64>() / count;
+    let scatter = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    mean > *CLEARLY * (scatter / count).sqrt()
 }
 
 /// From the errors of each fold's rows.
