@@ -141,9 +141,11 @@ pub(crate) fn unconfirmed(state: &FitState, found: &[Vec<usize>], fitter: &Fitte
     }
 }
 
-/// Whether some squared errors are less than others by more than twice the standard error of the mean of their differences.
+/// Whether some mean squares are less than others: ln of their ratios by more than twice the standard error of its mean, as an effect may be
+/// strong in one stretch and weak in another.
 fn is_clearly_less(some: &[f64], others: &[f64]) -> bool {
-    let gains: Vec<f64> = some.iter().zip(others).map(|(a, b)| b - a).collect();
+    let pairs = some.iter().zip(others);
+    let gains: Vec<f64> = pairs.map(|(some, other)| (other / some).ln()).collect();
     let count = gains.len().max(2) as f64;
     let mean = gains.iter().sum::<f64>() / count;
     let scatter = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0);
