@@ -145,7 +145,13 @@ fn a_file_says_whose_it_is_and_whether_it_was_edited() {
     let listed = calib(cell(), "export latest --format none").err;
     let (_, listed) = listed.split_once("[possible values: ").unwrap();
     let formats = listed.split_once(']').unwrap().0.split(", ");
-    let of_others = ["xacro", "ur_kinematics", "dynamics", "isaac", "mjcf_control"];
+    let of_others = [
+        "xacro",
+        "ur_kinematics",
+        "dynamics",
+        "isaac",
+        "mjcf_control",
+    ];
     assert_eq!(
         formats
             .clone()
