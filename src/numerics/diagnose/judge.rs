@@ -101,8 +101,8 @@ pub(crate) fn fold_error(now: &FitState, fitter: &Fitter) -> Option<f64> {
     Some(rms(&session, &folds, &errors))
 }
 
-/// Causes of findings that stretches of a path do not confirm: all findings where the stretches are not predicted clearly better with them
-/// than without any, else one after the other, the worst first; none where rows follow no path.
+/// Causes of findings that stretches of a path do not confirm: taken out one finding after the other, the worst first, while the stretches are
+/// not predicted clearly better with it, and all where that is so of those that stay together; none where rows follow no path.
 pub(crate) fn unconfirmed(state: &FitState, found: &[Vec<usize>], fitter: &Fitter) -> Vec<usize> {
     let stretches = || fitter.dense.then(|| folds(state, fitter)).flatten();
     let Some(folds) = stretches() else {
@@ -118,10 +118,6 @@ pub(crate) fn unconfirmed(state: &FitState, found: &[Vec<usize>], fitter: &Fitte
     };
     let mut out: Vec<usize> = Vec::new();
     let mut now = without(&out);
-    let all = found.concat();
-    if !all.is_empty() && !is_clearly_less(&now, &without(&all)) {
-        return all;
-    }
     let mut left: Vec<&Vec<usize>> = found.iter().collect();
     loop {
         let errors = left
@@ -136,8 +132,13 @@ pub(crate) fn unconfirmed(state: &FitState, found: &[Vec<usize>], fitter: &Fitte
                 now = errors;
                 out.extend(left.remove(at));
             }
-            None => return out,
+            None => break,
         }
+    }
+    let all = found.concat();
+    match left.len() > 1 && !is_clearly_less(&now, &without(&all)) {
+        true => all,
+        false => out,
     }
 }
 

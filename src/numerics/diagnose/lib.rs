@@ -154,7 +154,8 @@ impl<'a> Attempt<'a> {
             // What stretches of a path do not confirm is made of neighbours.
             let found = answer.found.iter().map(|found| found.members.clone());
             let found: Vec<Vec<usize>> = found.collect();
-            if rounds.again_without(&judge::unconfirmed(&next, &found, &fitter)) {
+            let unconfirmed = judge::unconfirmed(&next, &found, &fitter);
+            if rounds.again_unconfirmed(&unconfirmed, found.concat().len()) {
                 continue;
             }
             if rounds.exchange() {

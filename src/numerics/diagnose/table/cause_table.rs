@@ -38,6 +38,8 @@ pub(super) struct CauseTable<'f, 'a> {
     pub(crate) declared: Vec<usize>,
     /// Motions and variables whose products with others are cells.
     pub(crate) multiplied: Vec<FreeShape>,
+    /// Whether nothing joins any more: what is left is noise.
+    pub(crate) is_closed: bool,
     /// Whether curves may have steps: once all that is smooth was asked.
     pub(crate) has_steps: bool,
     /// What a joint that yields out of proportion to its load is called.
@@ -111,6 +113,7 @@ impl<'f, 'a> CauseTable<'f, 'a> {
             declared: declared.collect(),
             from_before: Vec::new(),
             multiplied: shown.to_vec(),
+            is_closed: false,
             has_steps: false,
             bent: match excludes(names::JOINT_HARDENING) {
                 true => names::UNKNOWN,

@@ -34,6 +34,7 @@ pub use state::KnownState;
 use super::round::{EstimatedCause, RoundView};
 use super::types::Located;
 use crate::criteria::cells::{IDLE, OPEN, ROUNDS, UNEXPLAINED};
+use crate::criteria::judge::REFUTED;
 use crate::criteria::screen::MISTAKES;
 use crate::effect::{Basis, Form, Law, Place, Survey, Variable, names};
 use crate::estimate::Prior;
@@ -62,6 +63,8 @@ pub(crate) struct Rounds {
     round: usize,
     /// Keys of cells that are not asked again: in the whole model they came to nothing.
     empty: BTreeSet<String>,
+    /// Searches in a row of which stretches of a path confirmed nothing.
+    refuted: usize,
     /// Keys of the cells of sets that were answered, or that an answer led to.
     exchanged: BTreeSet<Vec<String>>,
     /// What the last answer led to.
@@ -119,8 +122,18 @@ impl Rounds {
         *self = Self {
             first: self.first.take(),
             empty: std::mem::take(&mut self.empty),
+            refuted: self.refuted,
             ..Self::default()
         };
+    }
+
+    /// The same of those that stretches of a path do not confirm, of so many in all.
+    pub(crate) fn again_unconfirmed(&mut self, causes: &[usize], all: usize) -> bool {
+        match causes.len() == all {
+            true => self.refuted += 1,
+            false => self.refuted = 0,
+        }
+        self.again_without(causes)
     }
 
     /// From the beginning without the cells of some causes of the last model; false if they are none.
@@ -188,6 +201,7 @@ impl Rounds {
         let mut table = CauseTable::new(&mut frame, &survey, question, products, is_open, keeps);
         table.from_before.clone_from(&before);
         table.has_steps = self.pairs.is_some();
+        table.is_closed = self.refuted >= *REFUTED;
         let mut components = Vec::new();
         for (key, component) in known.components {
             if let Some(cell) = table.cell(&key) {

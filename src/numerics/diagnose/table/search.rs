@@ -50,7 +50,7 @@ impl Problem for CauseTable<'_, '_> {
         let state = self.state(&fit.components, Some(fit.kappa));
         let numbers: usize = fit.components.iter().map(|one| one.part.ncols()).sum();
         // So many numbers describe rows and explain nothing.
-        if 3.0 * numbers as f64 > state.rows.freedom {
+        if self.is_closed || 3.0 * numbers as f64 > state.rows.freedom {
             return CellScan::default();
         }
         let likely = before.map(|before| before.order.iter().copied().take(*LIKELY));
@@ -336,6 +336,9 @@ impl CauseTable<'_, '_> {
     /// Where the strongest cell is one of loads, every joint that yields to its own: one link that bends may look better than any one joint, and
     /// worse than all of them. Nothing else.
     pub(crate) fn start(&self) -> Vec<Component> {
+        if self.is_closed {
+            return Vec::new();
+        }
         let state = self.state(&[], None);
         let scan = self.scan(&state, *CLOSELY, &[]);
         let loads = |form: &Form| {
