@@ -25,7 +25,7 @@ use std::path::PathBuf;
 /// they cannot carry (Stribeck friction, friction of load, ripple) is listed with its size. All of it with sigma is in `dynamics`.
 ///
 /// Of a diagnosis of drives MJCF and `isaac` carry gains, damping, armature, friction, limits and delay, JSON all of it; `mjcf_control` is Python
-/// beside the MJCF for what MuJoCo's model cannot hold.
+/// next to the MJCF for what MuJoCo's model cannot hold.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct ExportArguments {

@@ -45,7 +45,7 @@ pub(crate) const DRIVE_FORMATS: &[DriveFormat] = &[
     },
     DriveFormat {
         name: "mjcf_control",
-        help: "Python beside the MJCF of diagnosed drives: what MuJoCo's model cannot hold, put in before every step",
+        help: "Python next to the MJCF of diagnosed drives: what MuJoCo's model cannot hold, put in before every step",
         carries: &[],
         text: control,
     },

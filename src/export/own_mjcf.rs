@@ -1,6 +1,6 @@
 //! The MJCF that a pipeline names as the arm's: a copy of it with what was identified of the torques of its joints.
 
-use super::friction::{ARMATURE, DAMPING, FRICTION, SPRINGS, digits, positive, spring};
+use super::friction::{ARMATURE, DAMPING, FRICTION, digits, positive};
 use super::rigid::MJCF;
 use super::{CarriedTorques, Export, Format};
 use crate::dynamics::FittedNumber;
@@ -8,9 +8,10 @@ use crate::error::{Error, Result, listed, one_line};
 use crate::raw::{self, ending};
 use roxmltree::{Document, Node};
 
-/// What a copy holds: bodies and drives stay those of the file.
+/// What a copy holds: bodies and drives stay those of the file. Where its joints have their zeros, and in which sense they turn, is not known here,
+/// so that it holds no spring.
 const COPY: Format = Format {
-    carries: CarriedTorques::Causes(&[DAMPING, FRICTION, ARMATURE, SPRINGS[0], SPRINGS[1]]),
+    carries: CarriedTorques::Causes(&[DAMPING, FRICTION, ARMATURE]),
     ..MJCF
 };
 
@@ -55,12 +56,9 @@ impl OwnMjcf {
             "a copy of {}: bodies, drives and what was not found of a joint are as there; identified masses are not carried",
             one_line(&self.file)
         ));
-        let compilers = document.descendants();
-        let mut compilers = compilers.filter(|node| node.has_tag_name("compiler"));
-        let in_radians = compilers.any(|node| node.attribute("angle") == Some("radian"));
         let mut edits: Vec<(std::ops::Range<usize>, String)> = Vec::new();
         for (index, node) in joints.into_iter().enumerate() {
-            for (name, number) in found(export, index, in_radians) {
+            for (name, number) in found(export, index) {
                 edits.push(edit(&node, name, &digits(number)));
             }
         }
@@ -124,7 +122,7 @@ impl OwnMjcf {
 }
 
 /// Attributes of a joint (from 0) that were found.
-fn found(export: &Export, joint: usize, in_radians: bool) -> Vec<(&'static str, FittedNumber)> {
+fn found(export: &Export, joint: usize) -> Vec<(&'static str, FittedNumber)> {
     let Some(torques) = &export.identified.torques else {
         return Vec::new();
     };
@@ -134,16 +132,7 @@ fn found(export: &Export, joint: usize, in_radians: bool) -> Vec<(&'static str, 
         ("frictionloss", FRICTION),
         ("armature", ARMATURE),
     ];
-    let mut found: Vec<_> = attributes.into_iter().filter_map(of).collect();
-    if let Some([stiffness, reference]) = spring(torques, joint) {
-        let unit = if in_radians { 1.0 } else { 1_f64.to_degrees() };
-        let reference = FittedNumber {
-            value: unit * reference.value,
-            sigma: unit * reference.sigma,
-        };
-        found.extend([("stiffness", stiffness), ("springref", reference)]);
-    }
-    found
+    attributes.into_iter().filter_map(of).collect()
 }
 
 /// Where an attribute of an element is written, and what.

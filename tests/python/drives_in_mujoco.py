@@ -1,4 +1,4 @@
-"""Commands rolled out in MuJoCo with what calib exports of a diagnosis of drives: its MJCF, with or without the Python beside it."""
+"""Commands rolled out in MuJoCo with what calib exports of a diagnosis of drives: its MJCF, with or without its Python."""
 
 import types
 
@@ -57,7 +57,7 @@ def controller(text):
 
 def rolled_out(text, drives, trajectories, control=None):
     """Simulated angles of trajectories (time, commands, measured angles) of one recording, one after the other, at the rows' times; `text` is
-    the MJCF, `control` the Python beside it."""
+    the MJCF, `control` its Python."""
     model = mujoco.MjModel.from_xml_string(text)
     joints, period, step = drives["joints"], 1 / drives["command_rate_hz"], model.opt.timestep
     names = [joint["joint"] for joint in joints]

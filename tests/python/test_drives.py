@@ -51,7 +51,7 @@ def test_the_exported_mjcf_of_a_concealed_recording_has_the_residual_that_calib_
 
 
 def is_carried(case, tmp_path):
-    """The residual in MuJoCo is within 5 % of the stated one: with the Python beside the model, and of the model alone, but for what its head
+    """The residual in MuJoCo is within 5 % of the stated one: with the Python of the model, and of the model alone, but for what its head
     says that it does not carry."""
     document = json.loads(calib("diagnose", case, tmp_path / "store", "--json"))
     text, control = (calib("export", case, tmp_path / "store", "--format", name) for name in ("mjcf", "mjcf_control"))

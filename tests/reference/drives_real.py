@@ -98,7 +98,7 @@ def diagnosed(calib, folder):
 
 
 def in_mujoco(calib, folder, recordings, stated):
-    """The residual (mrad rms) of the exported MJCF with the Python beside it, rolled out in MuJoCo, over that which calib states; of rows that judge.
+    """The residual (mrad rms) of the exported MJCF with its Python, rolled out in MuJoCo, over that which calib states; of rows that judge.
     `recordings` as (time, command, angle, fitted rows)."""
     sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
     from drives_in_mujoco import rolled_out

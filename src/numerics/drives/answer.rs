@@ -8,6 +8,7 @@ use crate::problem::Drives;
 use crate::rollout::Which;
 use crate::steps::HALVED;
 use calib_engine::{Accepted, Cell, Finding, Options};
+use nalgebra::DMatrix;
 use std::borrow::Cow;
 
 /// A number of a finding.
@@ -223,7 +224,8 @@ impl Drives {
     fn finding(&self, fit: &DriveFit, finding: &Finding<Key>) -> DriveFinding {
         let one = &finding.accepted;
         let at = fit.set.iter().position(|other| other.cell == one.cell);
-        let sigma = at.map_or(&[][..], |at| &fit.sigma[at][..]);
+        let covariance = at.map(|at| &fit.covariances[at]);
+        let sigma = |k: usize| covariance.map(|all| all[(k, k)].sqrt());
         let rest: Vec<Accepted<Key>> = fit
             .set
             .iter()
@@ -241,7 +243,7 @@ impl Drives {
         let numbers = cell.cause.numbers.iter().zip(fitted).enumerate();
         let mut parameters: Vec<DriveNumber> = numbers
             .map(|(k, (number, x))| {
-                let sigma = sigma.get(k).copied().filter(|sigma| *sigma > 0.0);
+                let sigma = sigma(k).filter(|sigma| *sigma > 0.0);
                 let value = if number.by_logarithm { x.exp() } else { *x };
                 let by = if number.by_logarithm { value } else { 1.0 };
                 DriveNumber {
@@ -253,11 +255,14 @@ impl Drives {
             })
             .collect();
         if let (Key::Cable(_), [stiffness, at_zero]) = (cell.key, &mut parameters[..]) {
-            let [k, moment] = [stiffness.value, at_zero.value];
-            let spread = |of: Option<f64>| of.unwrap_or_default() / k;
-            let rest = moment / k;
-            let sigma = spread(at_zero.sigma).hypot(rest * spread(stiffness.sigma));
-            (at_zero.value, at_zero.sigma) = (rest, at_zero.sigma.map(|_| sigma));
+            // Where it rests is its torque at 0 rad over its stiffness.
+            let rest = at_zero.value / stiffness.value;
+            let variance = |all: &DMatrix<f64>| {
+                let common = rest * (rest * all[(0, 0)] - 2.0 * all[(0, 1)]);
+                (common + all[(1, 1)]) / stiffness.value.powi(2)
+            };
+            let sigma = covariance.map(|all| variance(all).max(0.0).sqrt());
+            (at_zero.value, at_zero.sigma) = (rest, sigma.filter(|sigma| *sigma > 0.0));
         }
         if let Key::Coupling(_, by) = cell.key {
             parameters.push(DriveNumber {

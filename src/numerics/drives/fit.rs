@@ -63,8 +63,8 @@ pub struct DriveFit {
     pub doubt: Vec<f64>,
     /// Squared distance of all numbers from where they are expected, in their usual sizes.
     pub penalty: f64,
-    /// One standard deviation of each number of the set, as it is fitted.
-    pub sigma: Vec<Vec<f64>>,
+    /// Covariance of the numbers of each member, as they are fitted.
+    pub covariances: Vec<DMatrix<f64>>,
     /// ln of the prior odds of the set.
     pub log_prior: f64,
     /// Products of the columns in units of their priors.
@@ -305,7 +305,7 @@ impl Drives {
             rich: before.map_or(0.0, |fit| fit.rich),
             doubt: before.map_or_else(|| vec![1.0; n], |fit| fit.doubt.clone()),
             penalty: 0.0,
-            sigma: Vec::new(),
+            covariances: Vec::new(),
             log_prior: set
                 .iter()
                 .map(|one| one.cell.log_prior + one.cell.shapes[one.shape].log_weight)
@@ -430,17 +430,18 @@ impl Drives {
         fit.gram = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, k| {
             roots[i] * gram[(i, k)] * roots[k]
         });
-        fit.sigma = fit
-            .set
-            .iter()
-            .map(|one| vec![0.0; one.numbers.len()])
-            .collect();
+        let none = |one: &Accepted<Key>| DMatrix::zeros(one.numbers.len(), one.numbers.len());
+        fit.covariances = fit.set.iter().map(none).collect();
         let weight = weigh(&fit);
         let whole = &fit.gram * weight + DMatrix::identity(gram.nrows(), gram.ncols());
         if let Some(inverse) = whole.cholesky().map(|factor| factor.inverse()) {
             let nb = fit.inertia.len();
-            for (at, (c, k)) in columns.numbers.iter().enumerate() {
-                fit.sigma[*c][*k] = inverse[(nb + at, nb + at)].sqrt() * roots[nb + at];
+            for (a, (c, k)) in columns.numbers.iter().enumerate() {
+                for (b, (_, l)) in (columns.numbers.iter().enumerate()).filter(|(_, of)| of.0 == *c)
+                {
+                    let scaled = inverse[(nb + a, nb + b)];
+                    fit.covariances[*c][(*k, *l)] = scaled * roots[nb + a] * roots[nb + b];
+                }
             }
         }
         fit

@@ -53,21 +53,22 @@ mod tests {
     use calib_dynamics::InertialTolerance;
     use calib_engine::Problem;
 
+    const TOLERANCE: InertialTolerance = InertialTolerance {
+        mass_relative: 0.02,
+        centre: 1e-3,
+        inertia_relative: 0.02,
+    };
+
     #[test]
     fn what_inertials_take_up_beyond_their_tolerance_is_seen_as_a_cell_of_their_own() {
         let (chain, base, mut recording) = motion();
-        let tolerance = InertialTolerance {
-            mass_relative: 0.02,
-            centre: 1e-3,
-            inertia_relative: 0.02,
-        };
-        let drives = Drives::new(chain, base.clone(), recording.clone(), tolerance);
+        let drives = Drives::new(chain, base.clone(), recording.clone(), TOLERANCE);
         let mut shifted = base.clone();
         for axis in 0..3 {
             shifted.bodies.links[1].centre[axis] += 0.02;
         }
         recording.angle = drives.angles(&shifted, Which::All);
-        let measured = Drives::new(drives.chain.clone(), base, recording, tolerance);
+        let measured = Drives::new(drives.chain.clone(), base, recording, TOLERANCE);
         let fit = measured.fit(&[], None, f64::NEG_INFINITY);
         let around = measured.around(&fit, None);
         let scanned = measured.scan(&fit, &around, None);
@@ -79,12 +80,7 @@ mod tests {
     #[test]
     fn a_cause_without_a_small_size_begins_where_a_roll_out_says() {
         let (chain, base, mut recording) = motion();
-        let tolerance = InertialTolerance {
-            mass_relative: 0.02,
-            centre: 1e-3,
-            inertia_relative: 0.02,
-        };
-        let drives = Drives::new(chain, base.clone(), recording.clone(), tolerance);
+        let drives = Drives::new(chain, base.clone(), recording.clone(), TOLERANCE);
         let all = cells(&base, &drives.usual, recording.period, drives.shown);
         let cell = all.into_iter().find(|cell| cell.key == Key::DeadBand(0));
         let cell = cell.unwrap();
@@ -100,7 +96,7 @@ mod tests {
                 drives.chain.clone(),
                 base.clone(),
                 recording.clone(),
-                tolerance,
+                TOLERANCE,
             );
             let mut nothing = measured.fit(&[], None, f64::NEG_INFINITY);
             // What inertials within their tolerance take up is not the question here.

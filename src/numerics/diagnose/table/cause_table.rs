@@ -28,7 +28,7 @@ pub(super) struct CauseTable<'f, 'a> {
     /// The first of all coarse columns of each cell, and their number.
     pub(crate) first: Vec<usize>,
     pub(super) columns: usize,
-    /// Components in whose place nothing else comes near, with the numbers of those that did in part what they do.
+    /// Components that no other cell comes near to replacing, each with the numbers of the components that it overlaps.
     pub(super) firm: Mutex<BTreeMap<u64, Vec<u64>>>,
     /// The number of the next component.
     pub(crate) next: AtomicU64,
@@ -38,7 +38,7 @@ pub(super) struct CauseTable<'f, 'a> {
     pub(crate) declared: Vec<usize>,
     /// Motions and variables whose products with others are cells.
     pub(crate) multiplied: Vec<FreeShape>,
-    /// Whether nothing joins any more: what is left is noise.
+    /// Whether nothing joins any more: the residual is noise.
     pub(crate) is_closed: bool,
     /// Whether curves may have steps: once all that is smooth was asked.
     pub(crate) has_steps: bool,

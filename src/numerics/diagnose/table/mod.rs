@@ -129,10 +129,10 @@ impl Rounds {
 
     /// The same of those that stretches of a path do not confirm, of so many in all.
     pub(crate) fn again_unconfirmed(&mut self, causes: &[usize], all: usize) -> bool {
-        match causes.len() == all {
-            true => self.refuted += 1,
-            false => self.refuted = 0,
-        }
+        self.refuted = match causes.len() == all {
+            true => self.refuted + 1,
+            false => 0,
+        };
         self.again_without(causes)
     }
 

@@ -111,7 +111,7 @@ impl CauseTable<'_, '_> {
         self.refined_while(component.cell, found, state, &numbers, &|_| true)
     }
 
-    /// The same beside components that follow variables with such numbers; steps become smaller while ln of the evidence is worth it.
+    /// The same given components that follow variables with such numbers; steps become smaller while ln of the evidence is worth it.
     fn refined_while(
         &self,
         cell: usize,

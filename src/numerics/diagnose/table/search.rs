@@ -1,5 +1,5 @@
 //! The table of causes as a problem of the one search (`calib_engine`): what stands are components, each by its part in the covariance of the
-//! rows, so that a scan says exactly what any other cell would say beside them, and nothing but a chosen one is estimated anew.
+//! rows, so that a scan gives the exact evidence of any other cell given them, and nothing but a chosen one is estimated anew.
 
 use super::cause_table::CauseTable;
 use super::cell::{CellShape, FreeShape, Over};
@@ -203,8 +203,8 @@ impl CauseTable<'_, '_> {
         let component = &fit.components[out];
         let others = without(&fit.components, &[out]);
         let coupled = self.coupled(&others, std::slice::from_ref(component));
-        let beside: Vec<u64> = coupled.into_iter().map(|i| others[i].id).collect();
-        if self.firm().get(&component.id) == Some(&beside) {
+        let neighbours: Vec<u64> = coupled.into_iter().map(|i| others[i].id).collect();
+        if self.firm().get(&component.id) == Some(&neighbours) {
             return Vec::new();
         }
         let state = self.state(&others, Some(fit.kappa));
@@ -219,13 +219,13 @@ impl CauseTable<'_, '_> {
         let mut near = scan.likeliest(stays - *JOINS);
         near.retain(|(cell, _)| *cell != component.cell);
         if near.is_empty() {
-            self.firm().insert(component.id, beside);
+            self.firm().insert(component.id, neighbours);
         }
         near.retain(|(cell, _)| scan.log_odds[*cell] > stays + *SWAPS);
         self.scanned(near, &scan)
     }
 
-    /// What is known of components in whose place nothing comes near.
+    /// Components that no other cell comes near to replacing.
     fn firm(&self) -> MutexGuard<'_, BTreeMap<u64, Vec<u64>>> {
         self.firm.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -53,7 +53,7 @@ pub fn impossible_inertia(moments: &InertiaMoments) -> Option<String> {
 }
 
 /// m from a link at which its centre may always be: a counterweight.
-const BESIDE: f64 = 1.0;
+const COUNTERWEIGHT: f64 = 1.0;
 
 /// Why a centre is none of its link, from its joint to the next, if so: it is farther away than the whole arm is long.
 pub(super) fn outside_link(
@@ -63,7 +63,7 @@ pub(super) fn outside_link(
 ) -> Option<String> {
     let (from, to) = (points.get(link)?, points.get(link + 1)?);
     let lengths = points.windows(2).map(|pair| (pair[1] - pair[0]).norm());
-    let most = lengths.sum::<f64>().max(BESIDE);
+    let most = lengths.sum::<f64>().max(COUNTERWEIGHT);
     let along = to - from;
     let share = (centre - from).dot(&along) / along.norm_squared().max(f64::MIN_POSITIVE);
     let away = (centre - from - along * share.clamp(0.0, 1.0)).norm();
