@@ -3,6 +3,7 @@
 //! One sigma of every axis is (constant + per_metre * range) / coverage. Where a maker states a maximum permissible error (MPE) the
 //! divisor is 2: makers call half of it typical (Leica AT500 manual, 2.8.1). A calibration certificate says more than any of these.
 
+use calib_foundation::named;
 use nalgebra::Vector3;
 
 /// Noise of a point by its range.
@@ -82,58 +83,37 @@ impl Instrument {
     }
 }
 
-/// Where the standard deviation of a row's point comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum SigmaSource {
-    /// The recording states it.
-    Recorded,
-    /// By the instrument that was named.
-    Instrument,
-    /// Neither: [`START`].
-    Inferred,
-}
-
-impl SigmaSource {
-    /// All of them, in order of preference.
-    pub const ALL: [Self; 3] = [Self::Recorded, Self::Instrument, Self::Inferred];
-
-    /// As tables hold it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Recorded => "recorded",
-            Self::Instrument => "instrument",
-            Self::Inferred => "inferred",
-        }
+named! {
+    /// Where the standard deviation of a row's point comes from.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum SigmaSource {
+        /// The recording states it.
+        Recorded "recorded",
+        /// By the instrument that was named.
+        Instrument "instrument",
+        /// Neither: [`START`].
+        Inferred "inferred",
     }
 }
 
-/// What figures of noise rest on, the firmest first.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum NoiseBasis {
-    /// Poses that were measured again.
-    Repeats,
-    /// Standard deviations that were recorded, or an instrument that was stated.
-    #[default]
-    Instrument,
-    /// What a model leaves.
-    Inferred,
+named! {
+    /// What figures of noise rest on, the firmest first.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum NoiseBasis {
+        /// Poses that were measured again.
+        Repeats "repeats",
+        /// Standard deviations that were recorded, or an instrument that was stated.
+        #[default]
+        Instrument "instrument",
+        /// What a model leaves.
+        Inferred "inferred",
+    }
 }
 
 impl NoiseBasis {
-    /// All of them, in order of preference.
-    pub(crate) const ALL: [Self; 3] = [Self::Repeats, Self::Instrument, Self::Inferred];
-
-    /// As tables hold it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Repeats => "repeats",
-            Self::Instrument => "instrument",
-            Self::Inferred => "inferred",
-        }
-    }
-
     /// The basis of a name in a table.
     pub fn parse(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|basis| basis.name() == name)
+        let mut all = Self::ALL.iter().copied();
+        all.find(|basis| basis.name() == name)
     }
 }
