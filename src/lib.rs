@@ -108,7 +108,7 @@
 //! | cause of drives | a row of `causes!` in `src/numerics/drives/causes.rs`, its cells in `cells` there | a variant of `Key` in `key.rs`: what it changes of the roll-out; sentences as of an effect |
 //! | effect of a user's own | a YAML file as in `pipelines/case/effects`, read by [`effect::EffectDeclaration`] | `effects: [FILE]` of a stage `diagnose`, or `diagnose_torques` |
 //! | kind of measurement | `src/numerics/observation/<name>.rs`, which implements [`observation::MeasurementKind`] | its `mod`, and one line in [`observation::KINDS`] |
-//! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; with `.in_laws()` declared effects read it by its name |
+//! | circumstance of a row | - | one line in [`robot::CIRCUMSTANCES`]; one `in_laws` declared effects read by its name |
 //! | kind of raw file | `src/raw/<name>.rs`, which hands out records, the header first | its `mod` and `pub use` in `src/raw/lib.rs`; in `src/stage/ingest/reading.rs` a variant of `FileKind`, how a file is known to be one (`of`, the first that fits), and a line in `records`; `init` follows |
 //! | number that decides | a row of `src/numerics/criteria/<class>.rs` | the code that says `*NAME` |
 //! | setting of a stage | a field of its settings with `#[serde(default)]` and a doc line, which is its help in editors and on the page of stages; what it may be in `faults` | its use in `run`; a new stage number in `stage!` where tables of old settings change; then `CALIB_UPDATE=1 cargo test --test it pages schemas` |

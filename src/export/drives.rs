@@ -15,7 +15,7 @@ pub(crate) struct DriveFormat {
     /// What it is, in one line.
     pub(crate) help: &'static str,
     /// Causes that it holds.
-    carries: &'static [&'static str],
+    carries: &'static str,
     text: fn(&DriveExport) -> Result<String>,
 }
 
@@ -24,50 +24,28 @@ pub(crate) const DRIVE_FORMATS: &[DriveFormat] = &[
     DriveFormat {
         name: "mjcf",
         help: "MuJoCo model: gains, damping, armature, friction, limits, delay, elasticity",
-        carries: &[
-            "command_delay",
-            "command_offset",
-            "drive_gain",
-            "drive_damping",
-            "torque_limit",
-            "viscous_friction",
-            "coulomb_friction",
-            "cable_stiffness",
-            "rotor_inertia",
-            "joint_elasticity",
-            "backlash",
-            "payload_error",
-            "link_mass",
-            "link_com",
-            "gravity_direction",
-        ],
+        carries: "command_delay command_offset drive_gain drive_damping torque_limit \
+            viscous_friction coulomb_friction cable_stiffness rotor_inertia joint_elasticity backlash payload_error link_mass \
+            link_com gravity_direction",
         text: mjcf,
     },
     DriveFormat {
         name: "mjcf_control",
         help: "Python next to the MJCF of diagnosed drives: what MuJoCo's model cannot hold, put in before every step",
-        carries: &[],
+        carries: "",
         text: control,
     },
     DriveFormat {
         name: "isaac",
         help: "Isaac Lab's actuators of diagnosed drives: gains, armature, friction, limits, delay in steps",
-        carries: &[
-            "command_delay",
-            "drive_gain",
-            "drive_damping",
-            "torque_limit",
-            "viscous_friction",
-            "coulomb_friction",
-            "stribeck_friction",
-            "rotor_inertia",
-        ],
+        carries: "command_delay drive_gain drive_damping torque_limit viscous_friction \
+            coulomb_friction stribeck_friction rotor_inertia",
         text: isaac,
     },
     DriveFormat {
         name: "json",
         help: "Everything",
-        carries: &[],
+        carries: "",
         text: everything,
     },
 ];
@@ -136,7 +114,7 @@ impl DriveExport {
     fn left_out(&self) -> impl Iterator<Item = &FindingRow> {
         let all = self.format.carries;
         self.drives.findings.iter().filter(|finding| {
-            let carried = all.is_empty() || all.contains(&finding.effect.as_str());
+            let carried = all.is_empty() || all.split(' ').any(|cause| cause == finding.effect);
             !carried || (self.format.name == "mjcf" && self.is_seen_on_the_link(finding))
         })
     }
@@ -277,37 +255,11 @@ fn mjcf(export: &DriveExport) -> Result<String> {
 }
 
 /// Numbers of a joint that the controller reads.
-const CONTROLLED: [&str; 29] = [
-    "kp",
-    "kd",
-    "kd_on_error",
-    "torque_limit",
-    "command_offset",
-    "command_delay",
-    "dead_band",
-    "speed_limit",
-    "integral_gain",
-    "integral_limit",
-    "integral_start",
-    "damping",
-    "friction",
-    "stribeck_friction",
-    "stribeck_speed",
-    "load_friction_driving",
-    "load_friction_back",
-    "gear_friction_driving",
-    "gear_friction_back",
-    "presliding",
-    "warm_up_share",
-    "warm_up_share_viscous",
-    "warm_up_time",
-    "spring_stiffness",
-    "spring_reference",
-    "gear_stiffness",
-    "gear_damping",
-    "gear_play",
-    "gear_encoder_on_link",
-];
+const CONTROLLED: &str = "kp kd kd_on_error torque_limit command_offset command_delay dead_band \
+    speed_limit integral_gain integral_limit integral_start damping friction stribeck_friction stribeck_speed \
+    load_friction_driving load_friction_back gear_friction_driving gear_friction_back presliding warm_up_share \
+    warm_up_share_viscous warm_up_time spring_stiffness spring_reference gear_stiffness gear_damping gear_play \
+    gear_encoder_on_link";
 
 /// A list as Python reads it.
 fn list(items: impl IntoIterator<Item = String>) -> String {
@@ -319,14 +271,17 @@ fn control(export: &DriveExport) -> Result<String> {
     let simulation = &export.drives.simulation;
     let joints = || 1..=export.joints();
     let float = |value: f64| format!("{value:?}");
-    let drive = CONTROLLED.map(|name| {
-        let of = |joint: usize| match name {
-            "torque_limit" | "speed_limit" => simulation.value("joint", joint, name),
-            _ => Some(export.joint(joint, name)),
-        };
-        let values = joints().map(|joint| of(joint).map_or("None".into(), float));
-        format!("    {name:?}: {},\n", list(values))
-    });
+    let drive: String = CONTROLLED
+        .split(' ')
+        .map(|name| {
+            let of = |joint: usize| match name {
+                "torque_limit" | "speed_limit" => simulation.value("joint", joint, name),
+                _ => Some(export.joint(joint, name)),
+            };
+            let values = joints().map(|joint| of(joint).map_or("None".into(), float));
+            format!("    {name:?}: {},\n", list(values))
+        })
+        .collect();
     let arm = ["command_rate", "command_hold", "voltage_sag"].map(|name| {
         let value = simulation.value("arm", 0, name).unwrap_or(0.0);
         format!("{name:?}: {value:?}")
@@ -364,7 +319,7 @@ fn control(export: &DriveExport) -> Result<String> {
     let values = context! {
         names => list(simulation.joints().into_iter().map(quoted)),
         arm => format!("{{{}}}", arm.join(", ")),
-        drive => format!("{{\n{}}}", drive.concat()),
+        drive => format!("{{\n{drive}}}"),
         ripples => list(joints().map(ripples)), couplings => list(joints().map(couplings)), curves => list(joints().map(curves)),
         lags => format!("{SAG_LAG:?}, {LOAD_LAG:?}"),
     };

@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::store::frame::Frame;
 use crate::store::{Account, Claim, KEY_FORMAT, PendingTable, StageKey, Store, TableRef};
 use crate::table::Table;
+use calib_foundation::named;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -20,27 +21,18 @@ const RECORD_FORMAT: u32 = 1;
 /// Exit code of what may work later.
 pub(crate) const LATER: u8 = 75;
 
-/// How it ended for a robot.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Ending {
-    /// All stages are done.
-    #[default]
-    Done,
-    /// Its data are at fault: the same data will be rejected again.
-    Rejected,
-    /// The machine, or calib itself.
-    Failed,
-}
-
-impl Ending {
-    /// As tables hold it.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::Rejected => "rejected",
-            Self::Failed => "failed",
-        }
+named! {
+    /// How it ended for a robot.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Ending {
+        /// All stages are done.
+        #[default]
+        Done "done",
+        /// Its data are at fault: the same data will be rejected again.
+        Rejected "rejected",
+        /// The machine, or calib itself.
+        Failed "failed",
     }
 }
 

@@ -335,38 +335,21 @@ impl ExaminedFile {
     }
 }
 
-/// Robot files with the numbers of typical arms, which are to be replaced, each with its line of help. The first is that of `calib init` without
-/// `--robot`.
-pub(crate) const TYPICAL: &[(LibraryArm, &str)] = &[
-    (
-        LibraryArm {
-            name: "spherical6",
-            text: include_str!("robots/spherical6.yaml"),
-        },
-        "Six joints, the last three axes meet in a point (most industrial arms)",
-    ),
-    (
-        LibraryArm {
-            name: "offset6",
-            text: include_str!("robots/offset6.yaml"),
-        },
-        "Six joints, offset wrist (most cobots)",
-    ),
-    (
-        LibraryArm {
-            name: "seven",
-            text: include_str!("robots/seven.yaml"),
-        },
-        "Seven joints, alternating axes",
-    ),
-    (
-        LibraryArm {
-            name: "dh6",
-            text: include_str!("robots/dh6.yaml"),
-        },
-        "Six joints as a table of DH parameters",
-    ),
-];
+macro_rules! typical {
+    ($($name:literal $help:literal;)+) => {
+        /// Robot files with the numbers of typical arms, which are to be replaced, each with its line of help. The first is that of `calib init`
+        /// without `--robot`.
+        pub(crate) const TYPICAL: &[(LibraryArm, &str)] =
+            &[$((LibraryArm { name: $name, text: include_str!(concat!("robots/", $name, ".yaml")) }, $help)),+];
+    };
+}
+
+typical! {
+    "spherical6" "Six joints, the last three axes meet in a point (most industrial arms)";
+    "offset6" "Six joints, offset wrist (most cobots)";
+    "seven" "Seven joints, alternating axes";
+    "dh6" "Six joints as a table of DH parameters";
+}
 
 /// The typical arm of that name.
 pub(crate) fn typical(name: &str) -> Option<&'static LibraryArm> {

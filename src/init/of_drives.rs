@@ -2,6 +2,7 @@
 //! the files that `diagnose_drives` takes.
 
 use super::lerobot::{self, DataSet};
+use super::names::lists;
 use super::pipeline::{from_folder, name_of};
 use super::sheet::{self, Sheet, number};
 use crate::drives::mjcf::{self, MjcfArm, MjcfText};
@@ -24,81 +25,16 @@ pub(crate) struct DriveStart {
     pub(crate) notes: Vec<String>,
 }
 
-const COMMANDED: [&str; 17] = [
-    "cmd",
-    "command",
-    "commands",
-    "commanded",
-    "target",
-    "targets",
-    "desired",
-    "des",
-    "ref",
-    "goal",
-    "setpoint",
-    "action",
-    "actions",
-    "control",
-    "soll",
-    "sollwert",
-    "vorgabe",
-];
-const MEASURED: [&str; 14] = [
-    "q",
-    "pos",
-    "position",
-    "positions",
-    "angle",
-    "angles",
-    "measured",
-    "meas",
-    "actual",
-    "state",
-    "observation",
-    "joint",
-    "ist",
-    "istwert",
-];
+const COMMANDED: &str = "cmd command commands commanded target targets desired des ref goal setpoint \
+    action actions control soll sollwert vorgabe";
+const MEASURED: &str = "q pos position positions angle angles measured meas actual state observation \
+    joint ist istwert";
 /// Words of columns that are neither.
-const OTHERS: [&str; 16] = [
-    "dq",
-    "qd",
-    "vel",
-    "velocity",
-    "velocities",
-    "speed",
-    "torque",
-    "torques",
-    "tau",
-    "effort",
-    "current",
-    "currents",
-    "temp",
-    "temperature",
-    "acc",
-    "voltage",
-];
-const CLOCKS: [&str; 7] = [
-    "time",
-    "timestamp",
-    "t",
-    "stamp",
-    "clock",
-    "timestamps",
-    "zeit",
-];
+const OTHERS: &str = "dq qd vel velocity velocities speed torque torques tau effort current currents \
+    temp temperature acc voltage";
+const CLOCKS: &str = "time timestamp t stamp clock timestamps zeit";
 /// Words of a column that tells trajectories apart.
-const TRAJECTORIES: [&str; 9] = [
-    "traj",
-    "trajectory",
-    "episode",
-    "run",
-    "segment",
-    "trial",
-    "fahrt",
-    "lauf",
-    "bahn",
-];
+const TRAJECTORIES: &str = "traj trajectory episode run segment trial fahrt lauf bahn";
 /// Rows a trajectory at least: what changes more often is something else.
 const SHORTEST: usize = 20;
 /// What the stage takes without being told.
@@ -130,8 +66,8 @@ fn words(text: &str) -> Vec<String> {
     parts.map(str::to_ascii_lowercase).collect()
 }
 
-fn has(text: &str, list: &[&str]) -> bool {
-    words(text).iter().any(|word| list.contains(&word.as_str()))
+fn has(text: &str, list: &str) -> bool {
+    words(text).iter().any(|word| lists(list, word))
 }
 
 impl Table {
@@ -231,7 +167,7 @@ impl Table {
             pairs.filter(|pair| pair[0][at] != pair[1][at]).count()
         };
         let named = self.head.iter().enumerate();
-        let mut named = named.filter(|(_, column)| has(column, &TRAJECTORIES));
+        let mut named = named.filter(|(_, column)| has(column, TRAJECTORIES));
         named
             .find(|(at, _)| changes(*at) * SHORTEST < self.rows.len())
             .map(|(_, column)| column)
@@ -301,7 +237,7 @@ impl Table {
 
     /// The column of time, its unit, and s between two rows.
     fn clock(&self) -> Option<(String, &'static str, f64)> {
-        let is_clock = |column: &&String| has(column, &CLOCKS);
+        let is_clock = |column: &&String| has(column, CLOCKS);
         let column = self.head.iter().find(is_clock)?;
         let at = self.head.iter().position(|one| one == column)?;
         let time = self.numbers(at)?;
@@ -427,17 +363,17 @@ pub(crate) fn start_drives(folder: &Path, data: &[PathBuf], robot: &Path) -> Res
     let recorded = |names: &[String]| -> Option<[(usize, Found); 2]> {
         let commanded = |table: &Table, column: &str| {
             let file = table.path.file_stem().unwrap_or_default().to_string_lossy();
-            has(column, &COMMANDED) || (tables.len() == 2 && has(&file, &COMMANDED))
+            has(column, COMMANDED) || (tables.len() == 2 && has(&file, COMMANDED))
         };
         let (mut command, mut angle) = (None, None);
         for (k, table) in tables.iter().enumerate() {
             for one in table.quantities(names) {
-                if has(&one.column, &OTHERS) {
+                if has(&one.column, OTHERS) {
                     continue;
                 }
                 match commanded(table, &one.column) {
                     true if command.is_none() => command = Some((k, one)),
-                    false if angle.is_none() && has(&one.column.replace("{j}", " "), &MEASURED) => {
+                    false if angle.is_none() && has(&one.column.replace("{j}", " "), MEASURED) => {
                         angle = Some((k, one));
                     }
                     _ => (),

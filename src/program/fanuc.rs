@@ -141,7 +141,7 @@ impl<'p> Reader<'_, 'p> {
         Some(token)
     }
     fn word(&mut self, word: &str) -> bool {
-        self.take(|token| token.is_word(&[word])).is_some()
+        self.take(|token| token.is_word(word)).is_some()
     }
     fn sign(&mut self, sign: u8) -> Option<()> {
         match self.take(|token| token.is(sign)) {
@@ -169,7 +169,7 @@ impl<'p> Reader<'_, 'p> {
 
     /// `P[1:"name"]{ GP1: ... };`
     fn position(&mut self) -> Option<()> {
-        let Some(head) = self.take(|token| token.is_word(&["P"])) else {
+        let Some(head) = self.take(|token| token.is_word("P")) else {
             return self.fault("`P[NUMBER]{...};`");
         };
         self.sign(b'[')?;

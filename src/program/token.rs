@@ -44,9 +44,9 @@ impl<'p> Token<'p> {
     }
 
     /// A word that is one of these, in any case.
-    pub(super) fn is_word(&self, words: &[&str]) -> bool {
-        let is = |word: &&str| word.as_bytes().eq_ignore_ascii_case(self.text());
-        self.sort == TokenKind::Word && words.iter().any(is)
+    pub(super) fn is_word(&self, words: &str) -> bool {
+        let is = |word: &str| word.as_bytes().eq_ignore_ascii_case(self.text());
+        self.sort == TokenKind::Word && words.split(' ').any(is)
     }
 
     /// +1 where a bracket opens, -1 where it closes.

@@ -37,28 +37,9 @@ const MOTIONS: [(&str, usize); 6] = [
     ("servoc", 1),
 ];
 /// Functions whose arguments are no targets, whatever their form.
-const OTHERS: [&str; 20] = [
-    "set_tcp",
-    "set_payload",
-    "set_payload_cog",
-    "set_target_payload",
-    "set_payload_mass",
-    "set_gravity",
-    "force_mode",
-    "speedj",
-    "speedl",
-    "stopj",
-    "textmsg",
-    "popup",
-    "freedrive_mode",
-    "set_tool_voltage",
-    "sleep",
-    "sync",
-    "write_output_float_register",
-    "rtde_set_watchdog",
-    "force_mode_set_damping",
-    "zero_ftsensor",
-];
+const OTHERS: &str = "set_tcp set_payload set_payload_cog set_target_payload set_payload_mass set_gravity \
+    force_mode speedj speedl stopj textmsg popup freedrive_mode set_tool_voltage sleep sync write_output_float_register \
+    rtde_set_watchdog force_mode_set_damping zero_ftsensor";
 const SET_LOAD: [&str; 3] = ["set_payload", "set_target_payload", "set_payload_mass"];
 const INVERSE: &str = "get_inverse_kin";
 
@@ -284,7 +265,7 @@ impl Reader {
         } else if SET_LOAD.contains(&&*name) {
             self.loads.push((at, number(first).map(|(mass, _)| mass)));
         }
-        if OTHERS.contains(&&*name) {
+        if OTHERS.split(' ').any(|other| other == name) {
             return;
         }
         self.others(inside, &format!("a call of `{name}`"));

@@ -9,6 +9,7 @@ use crate::estimate::Units;
 use crate::remarks::{copied_rows, copies_remark};
 use crate::table::{Recording, Split, SplitRow};
 use crate::{Context, Stage, matches};
+use calib_foundation::named;
 use calib_numerics::robot::Measurements;
 use calib_numerics::robot::pose_groups::near;
 use rand::SeedableRng;
@@ -512,33 +513,25 @@ fn torn(recording: &Recording, sets: &[String]) -> Option<String> {
 /// Poses that are named of many.
 const TORN_NAMED: usize = 3;
 
-/// A column of names.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum NamedColumn {
-    /// What sockets the target lay in.
-    Socket,
-    /// Planes that it touched.
-    Plane,
-    /// Spheres that it touched.
-    Sphere,
-    /// Ends of distances.
-    Anchor,
-    /// Targets on the tool.
-    Target,
+named! {
+    /// A column of names.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "snake_case")]
+    pub enum NamedColumn {
+        /// What sockets the target lay in.
+        Socket "socket",
+        /// Planes that it touched.
+        Plane "plane",
+        /// Spheres that it touched.
+        Sphere "sphere",
+        /// Ends of distances.
+        Anchor "anchor",
+        /// Targets on the tool.
+        Target "target",
+    }
 }
 
 impl NamedColumn {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Socket => "socket",
-            Self::Plane => "plane",
-            Self::Sphere => "sphere",
-            Self::Anchor => "anchor",
-            Self::Target => "target",
-        }
-    }
-
     /// The names of the rows; blank where a row has none. Fails where the recording has no such column.
     pub(super) fn of<'a>(self, recording: &'a Recording, place: &str) -> Result<Vec<&'a str>> {
         let column = match self {

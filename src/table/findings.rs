@@ -9,6 +9,7 @@ use crate::{
     RivalRow, Rivals, ShareRow, Shares, Spectrum, SpectrumRow, Verdict, VerdictRow,
     VerdictSentenceRow, VerdictSentences,
 };
+use calib_foundation::named;
 use calib_numerics::robot::NoiseBasis;
 
 impl FindingRow {
@@ -363,25 +364,16 @@ impl Verdict {
     }
 }
 
-/// What a sentence is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum VerdictTopic {
-    /// What the data cannot show.
-    NotObservable,
-    /// What to measure next.
-    NextMeasurement,
-    /// What is odd about the recording.
-    Remark,
-}
-
-impl VerdictTopic {
-    /// As the table has it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NotObservable => "not_observable",
-            Self::NextMeasurement => "next_measurement",
-            Self::Remark => "remark",
-        }
+named! {
+    /// What a sentence is about.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum VerdictTopic {
+        /// What the data cannot show.
+        NotObservable "not_observable",
+        /// What to measure next.
+        NextMeasurement "next_measurement",
+        /// What is odd about the recording.
+        Remark "remark",
     }
 }
 

@@ -208,9 +208,8 @@ impl Table for Recording {
             }
         }
         let known = |name: Option<String>| {
-            SigmaSource::ALL
-                .into_iter()
-                .find(|source| name.as_deref() == Some(source.name()))
+            let mut all = SigmaSource::ALL.iter().copied();
+            all.find(|source| name.as_deref() == Some(source.name()))
                 .unwrap_or(SigmaSource::Recorded)
         };
         let source = if has(SOURCE) {

@@ -77,13 +77,8 @@ pub struct Contradicted(pub Withdrawn);
 
 impl fmt::Display for Withdrawn {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            step,
-            rms_mm,
-            than,
-            than_rms_mm,
-            points,
-        } = self;
+        let (step, than, points) = (&self.step, &self.than, self.points);
+        let (rms_mm, than_rms_mm) = (self.rms_mm, self.than_rms_mm);
         write!(
             f,
             "`{step}` is withdrawn and `{than}` used instead: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}` at the same {points} points, predicted by fits without them"
@@ -93,13 +88,8 @@ impl fmt::Display for Withdrawn {
 
 impl fmt::Display for Contradicted {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Withdrawn {
-            step,
-            rms_mm,
-            than,
-            than_rms_mm,
-            points,
-        } = &self.0;
+        let (step, than, points) = (&self.0.step, &self.0.than, self.0.points);
+        let (rms_mm, than_rms_mm) = (self.0.rms_mm, self.0.than_rms_mm);
         write!(
             f,
             "the {points} held-out points contradict the choice of `{step}`: {rms_mm:.3} mm rms after `{step}`, {than_rms_mm:.3} mm after `{than}`. Held-out points judge a step and never choose one: something differs there that the fitted points do not show"

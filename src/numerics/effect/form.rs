@@ -16,6 +16,9 @@ use std::sync::Arc;
 /// Name, unit and one sigma of what is known before any measurement (SI), of a coefficient.
 pub type NumberSpec = (String, Unit, f64);
 
+/// The standard error of a coefficient by its number, SI.
+pub type Errors<'e> = dyn Fn(usize) -> f64 + 'e;
+
 /// What a [`Form`] holds: a law at a place ([`Term`]), one that a user declared ([`DeclaredForm`]), or a motion with physics of its own and
 /// what it changes about the load. It is all that has to be written of such a motion.
 pub trait Placed: Send + Sync {
@@ -60,12 +63,7 @@ pub trait Placed: Send + Sync {
     }
     /// Why coefficients `p` (SI) cannot be its cause's, as a clause: a number beyond what physics allows, or beyond what the recording holds.
     /// Beyond `error` (SI, by coefficient) a coefficient is firmly on its side of zero.
-    fn impossible(
-        &self,
-        _p: &[f64],
-        _error: &dyn Fn(usize) -> f64,
-        _survey: &Survey,
-    ) -> Option<String> {
+    fn impossible(&self, _p: &[f64], _error: &Errors, _survey: &Survey) -> Option<String> {
         None
     }
     /// Other causes that do the same in a finding of the name `called`, in whatever data: identities of kinematics and statics.
@@ -151,7 +149,7 @@ pub trait Placed: Send + Sync {
         false
     }
     /// Whether coefficients `p` say, by more than their standard errors, that something moves against its load: no spring does.
-    fn is_against_load(&self, _p: &[f64], _error: &dyn Fn(usize) -> f64) -> bool {
+    fn is_against_load(&self, _p: &[f64], _error: &Errors) -> bool {
         false
     }
     /// The joint that winds up under its load, and by how much (rad/Nm) with coefficients `p`.
@@ -545,12 +543,7 @@ impl Placed for Term {
         self.cause.variant(self)
     }
 
-    fn impossible(
-        &self,
-        p: &[f64],
-        error: &dyn Fn(usize) -> f64,
-        survey: &Survey,
-    ) -> Option<String> {
+    fn impossible(&self, p: &[f64], error: &Errors, survey: &Survey) -> Option<String> {
         self.cause.law(self)?.impossible(self, p, error, survey)
     }
 

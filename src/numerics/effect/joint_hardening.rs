@@ -3,8 +3,8 @@
 use super::form::placed;
 use super::unknown::PLAUSIBLE;
 use super::{
-    ArmState, BeyondRange, Cause, Deflection, Form, Hypothesis, Measure, NumberSpec, OwnMotion,
-    ParameterEstimate, Place, Placed, Summary, Survey, Variable, figure, names,
+    ArmState, BeyondRange, Cause, Deflection, Errors, Form, Hypothesis, Measure, NumberSpec,
+    OwnMotion, ParameterEstimate, Place, Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::effect::{self, RARE};
 use crate::robot::RobotModel;
@@ -221,7 +221,7 @@ impl Placed for BentWindup {
     }
 
     /// Both near no load and far out.
-    fn is_against_load(&self, p: &[f64], error: &dyn Fn(usize) -> f64) -> bool {
+    fn is_against_load(&self, p: &[f64], error: &Errors) -> bool {
         let per = if let HardeningLaw::Curve { most_nm } = self.law {
             1.0 / most_nm
         } else {
@@ -237,12 +237,7 @@ impl Placed for BentWindup {
         Some((self.joint, *p.first()?))
     }
 
-    fn impossible(
-        &self,
-        _p: &[f64],
-        _error: &dyn Fn(usize) -> f64,
-        survey: &Survey,
-    ) -> Option<String> {
+    fn impossible(&self, _p: &[f64], _error: &Errors, survey: &Survey) -> Option<String> {
         let (HardeningLaw::Saturating { at_nm }
         | HardeningLaw::SoftZone { at_nm }
         | HardeningLaw::Knee { at_nm }) = self.law

@@ -4,8 +4,8 @@
 use super::form::placed;
 use super::summary::rounded;
 use super::{
-    ArmState, Cause, Deflection, Form, HiddenSize, Hypothesis, NumberSpec, OwnMotion, Place,
-    Placed, Summary, Survey, Variable, figure, names,
+    ArmState, Cause, Deflection, Errors, Form, HiddenSize, Hypothesis, NumberSpec, OwnMotion,
+    Place, Placed, Summary, Survey, Variable, figure, names,
 };
 use crate::criteria::words::CLOCKS;
 use crate::robot::RobotModel;
@@ -180,12 +180,7 @@ impl Placed for Lag {
     }
 
     /// Two clocks may be apart either way; of standing points what is still to come is no less than nothing.
-    fn impossible(
-        &self,
-        p: &[f64],
-        error: &dyn Fn(usize) -> f64,
-        _survey: &Survey,
-    ) -> Option<String> {
+    fn impossible(&self, p: &[f64], error: &Errors, _survey: &Survey) -> Option<String> {
         let (most, share) = p
             .iter()
             .copied()

@@ -4,8 +4,8 @@ use super::basis::around;
 use super::law_shapes::{self, RatedLaws, Warmth};
 use super::motion::{SHORT, extent};
 use super::{
-    Axes, AxisPoint, Basis, Cause, Factor, Hypothesis, Law, Motion, NumberSpec, Polar, Survey,
-    Term, Variable, figure,
+    Axes, AxisPoint, Basis, Cause, Errors, Factor, Hypothesis, Law, Motion, NumberSpec, Polar,
+    Survey, Term, Variable, figure,
 };
 use crate::criteria::effect::{RARE, RARER};
 use crate::robot::RobotModel;
@@ -272,7 +272,7 @@ impl LawRow {
         &self,
         term: &Term,
         p: &[f64],
-        error: &dyn Fn(usize) -> f64,
+        error: &Errors,
         survey: &Survey,
     ) -> Option<String> {
         let value = *p.first()?;

@@ -40,7 +40,7 @@ pub use declared::{
     ShapeRange, Starts,
 };
 pub use deflection::{BeyondRange, Deflection, Direction};
-pub use form::{Form, NumberSpec, Placed, Term, is_own_table};
+pub use form::{Errors, Form, NumberSpec, Placed, Term, is_own_table};
 pub use geometry::{AnchorShift, BasePlacement, ToolOffset, tolerance};
 pub use law::{Factor, Law};
 pub use law_row::{At, Follows, LawRow, Limit, Times, Turning};

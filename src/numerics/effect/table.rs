@@ -30,6 +30,23 @@ const TWO_FACES: Measure = Measure {
 
 const ORDER: &str = "{order} times a turn by {amplitude}";
 
+/// A law of a kind, with what is its own.
+macro_rules! row {
+    ($kind:ident $(, $field:ident: $value:expr)*) => {
+        LawRow { $($field: $value,)* ..$kind }
+    };
+}
+
+/// What to measure, and how soon among what else is to be measured.
+macro_rules! measure {
+    ($rank:literal: $advice:literal) => {
+        Some(Measure {
+            rank: $rank,
+            advice: $advice,
+        })
+    };
+}
+
 const PLAIN: LawRow = LawRow::PLAIN;
 /// No gear or encoder errs by more than a quarter of a degree.
 const GEAR: LawRow = LawRow {
@@ -144,11 +161,7 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "axis_wobble, link_geometry",
         needs: "a wide travel of joint A",
         sentence: "{place}: the second moves with the first by {100:2} % of its angle",
-        laws: &[LawRow {
-            at: At::Pairs,
-            follows: Angle,
-            ..PLAIN
-        }],
+        laws: &[row!(PLAIN, at: At::Pairs, follows: Angle)],
         arm_effect: Some(|_| Box::new(DeclaredCouplings)),
         ..Cause::PLAIN
     },
@@ -166,30 +179,12 @@ pub static CAUSES: &[&Cause] = &[
         sentence: "the transmission or encoder of {place} errs periodically with its angle: {each}",
         // Eccentricity makes the lowest orders on any joint; strain wave gears and absolute encoders show some twenty, worm wheels more.
         laws: &[
-            LawRow {
-                follows: Waves(Turning::Joint, [1, 4], false),
-                tried: || *LOW_ORDERS,
-                ..GEAR
-            },
-            LawRow {
-                follows: Waves(Turning::Joint, [1, 4], true),
-                tried: || *LOW_ORDERS,
-                rarity: || *UNCOMMON,
-                says: "{order} times a turn by {amplitude} and {twice} times by {overtone}",
-                ..GEAR
-            },
-            LawRow {
-                follows: Waves(Turning::Joint, [5, 48], false),
-                tried: || 48,
-                ..GEAR
-            },
+            row!(GEAR, follows: Waves(Turning::Joint, [1, 4], false), tried: || *LOW_ORDERS),
+            row!(GEAR, follows: Waves(Turning::Joint, [1, 4], true), tried: || *LOW_ORDERS, rarity: || *UNCOMMON,
+                says: "{order} times a turn by {amplitude} and {twice} times by {overtone}"),
+            row!(GEAR, follows: Waves(Turning::Joint, [5, 48], false), tried: || 48),
             // Gears with a fraction of a turn.
-            LawRow {
-                follows: HalfOrders(20),
-                tried: || 48,
-                rarity: || *UNCOMMON,
-                ..GEAR
-            },
+            row!(GEAR, follows: HalfOrders(20), tried: || 48, rarity: || *UNCOMMON),
         ],
         same: |term| {
             let first = matches!(term.basis(), Basis::Wave { order: 1, .. });
@@ -206,11 +201,7 @@ pub static CAUSES: &[&Cause] = &[
         needs: "reduction ratios in the robot file",
         sentence: "{place} errs periodically with its motor's angle, amplitude {amplitude}",
         // Shaft, and two teeth or poles.
-        laws: &[LawRow {
-            follows: Waves(Turning::Motor, [1, 2], false),
-            tried: || 2,
-            ..PLAIN
-        }],
+        laws: &[row!(PLAIN, follows: Waves(Turning::Motor, [1, 2], false), tried: || 2)],
         ..Cause::PLAIN
     },
     &Cause {
@@ -221,17 +212,10 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "backlash where the joint travels little, gear_cyclic where all poses are approached from one side",
         needs: "both directions of approach over the joint's range",
         sentence: "the two flanks of the teeth of {place} err differently: {each} to either side",
-        laws: &[LawRow {
-            follows: Waves(Turning::Joint, [1, 24], false),
-            times: Some(Times::Approach),
-            tried: || 48,
-            says: ORDER,
-            ..PLAIN
-        }],
-        measure: Some(Measure {
-            rank: 5,
-            advice: "repeat poses from both sides over the whole range of the joint",
-        }),
+        laws: &[
+            row!(PLAIN, follows: Waves(Turning::Joint, [1, 24], false), times: Some(Times::Approach), tried: || 48, says: ORDER),
+        ],
+        measure: measure!(5: "repeat poses from both sides over the whole range of the joint"),
         ..Cause::PLAIN
     },
     &Cause {
@@ -242,19 +226,11 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "gear_cyclic where the load hardly changes, joint_compliance where the joint travels little",
         needs: "link masses, loads that change at the same angle",
         sentence: "the gear of {place} errs periodically, in proportion to its load: {each}",
-        laws: &[LawRow {
-            follows: Waves(Turning::Joint, [1, 24], false),
-            times: Some(Times::Load),
-            tried: || 48,
-            rarity: || *RARE,
-            sigma: 1e-4,
-            says: ORDER,
-            ..PLAIN
-        }],
-        measure: Some(Measure {
-            rank: 5,
-            advice: "repeat poses with and without a payload over the whole range of the joint",
-        }),
+        laws: &[
+            row!(PLAIN, follows: Waves(Turning::Joint, [1, 24], false), times: Some(Times::Load), tried: || 48, rarity: || *RARE,
+                sigma: 1e-4, says: ORDER),
+        ],
+        measure: measure!(5: "repeat poses with and without a payload over the whole range of the joint"),
         ..Cause::PLAIN
     },
     &Cause {
@@ -276,47 +252,19 @@ pub static CAUSES: &[&Cause] = &[
         needs: "both directions of approach",
         sentence: "{place} has lost motion to the side that its load pushes it",
         laws: &[
-            LawRow {
-                follows: Side,
-                positive: true,
-                says: "{place} has lost motion: a half-gap of {size} to the side that the load pushes it",
-                ..GAP
-            },
-            LawRow {
-                follows: Push,
-                positive: true,
+            row!(GAP, follows: Side, positive: true,
+                says: "{place} has lost motion: a half-gap of {size} to the side that the load pushes it"),
+            row!(GAP, follows: Push, positive: true,
                 says: "{place} has lost motion: a half-gap of {size} by the direction of approach, and above about {friction} Nm to the \
-                       side to which the load pushes it",
-                ..GAP
-            },
-            LawRow {
-                says: "{place} has lost motion: a half-gap of {size} by the direction of approach",
-                ..GAP
-            },
-            LawRow {
-                times: Some(Times::Time),
-                tried: || 2,
-                rarity: || *RARE,
-                number: "half_gap_in_the_end",
-                variant: "growing",
-                says: "the lost motion of {place} grows, to a half-gap of {size} in the end",
-                ..GAP
-            },
-            LawRow {
-                times: Some(Times::Load),
-                tried: || 2,
-                rarity: || *RARE,
-                number: "half_gap_per_load",
-                sigma: 1e-4,
+                       side to which the load pushes it"),
+            row!(GAP, says: "{place} has lost motion: a half-gap of {size} by the direction of approach"),
+            row!(GAP, times: Some(Times::Time), tried: || 2, rarity: || *RARE, number: "half_gap_in_the_end", variant: "growing",
+                says: "the lost motion of {place} grows, to a half-gap of {size} in the end"),
+            row!(GAP, times: Some(Times::Load), tried: || 2, rarity: || *RARE, number: "half_gap_per_load", sigma: 1e-4,
                 variant: "by_load",
-                says: "the compliance of {place} depends on the direction of approach: half the difference is {value}",
-                ..GAP
-            },
+                says: "the compliance of {place} depends on the direction of approach: half the difference is {value}"),
         ],
-        measure: Some(Measure {
-            rank: 5,
-            advice: "repeat poses from both sides under loads of both signs",
-        }),
+        measure: measure!(5: "repeat poses from both sides under loads of both signs"),
         ..Cause::PLAIN
     },
     &Cause {
@@ -327,15 +275,9 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "backlash where all moves are long, joint_log_lag",
         needs: "rows in the order of measurement, short moves among them",
         sentence: "lost motion of {place} fades in after each reversal: {size} to either side",
-        laws: &[LawRow {
-            follows: Slip,
-            says: "lost motion of {place} fades in after each reversal over a travel of {travel} deg: {size} to either side",
-            ..GAP
-        }],
-        measure: Some(Measure {
-            rank: 5,
-            advice: "approach one pose from both sides in steps of a tenth of a degree up to ten",
-        }),
+        laws: &[row!(GAP, follows: Slip,
+                says: "lost motion of {place} fades in after each reversal over a travel of {travel} deg: {size} to either side")],
+        measure: measure!(5: "approach one pose from both sides in steps of a tenth of a degree up to ten"),
         ..Cause::PLAIN
     },
     &Cause {
@@ -349,27 +291,11 @@ pub static CAUSES: &[&Cause] = &[
         // Aluminium grows by 23e-6 a kelvin, zinc by 30e-6, the polymers of light links by up to 70e-6; no arm warms up by more than 60 K.
         // What the search may try is more, so that what is no growth is not forced into another name.
         laws: &[
-            LawRow {
-                follows: Follows::Warmth(&[Temperature]),
-                largest: 1e-4,
-                limit: Some(Limit {
-                    most: 7e-5,
-                    ..OF_LINKS
-                }),
-                sigma: 1e-3,
-                says: "{place} grows by {1e6:1} um/m for each kelvin{lagging}",
-                ..GROWTH
-            },
-            LawRow {
-                follows: Follows::Warmth(&[WarmUp]),
-                largest: 60.0 * 1e-4,
-                limit: Some(Limit {
-                    most: 60.0 * 7e-5,
-                    ..OF_LINKS
-                }),
-                says: "{place} grows as the robot warms up, {1e6:0} um/m in the end with a time constant of {span}",
-                ..GROWTH
-            },
+            row!(GROWTH, follows: Follows::Warmth(&[Temperature]), largest: 1e-4, limit: Some(Limit { most: 7e-5, ..OF_LINKS }),
+                sigma: 1e-3, says: "{place} grows by {1e6:1} um/m for each kelvin{lagging}"),
+            row!(GROWTH, follows: Follows::Warmth(&[WarmUp]), largest: 60.0 * 1e-4,
+                limit: Some(Limit { most: 60.0 * 7e-5, ..OF_LINKS }),
+                says: "{place} grows as the robot warms up, {1e6:0} um/m in the end with a time constant of {span}"),
         ],
         measure: Some(WATCH),
         ..Cause::PLAIN
@@ -383,23 +309,9 @@ pub static CAUSES: &[&Cause] = &[
         needs: "temperature or time",
         sentence: "{place} changes with warmth: {each}",
         laws: &[
-            LawRow {
-                says: "its zero by {1:0} arcsec {pace}",
-                ..ZERO
-            },
-            LawRow {
-                times: Some(Times::Angle),
-                variant: "ratio",
-                says: "its ratio by {1e6:0} ppm {pace}",
-                ..ZERO
-            },
-            LawRow {
-                times: Some(Times::Load),
-                sigma: 1e-4,
-                variant: "stiffness",
-                says: "its compliance by {1e6:2} urad/Nm {pace}",
-                ..ZERO
-            },
+            row!(ZERO, says: "its zero by {1:0} arcsec {pace}"),
+            row!(ZERO, times: Some(Times::Angle), variant: "ratio", says: "its ratio by {1e6:0} ppm {pace}"),
+            row!(ZERO, times: Some(Times::Load), sigma: 1e-4, variant: "stiffness", says: "its compliance by {1e6:2} urad/Nm {pace}"),
         ],
         measure: Some(WATCH),
         separable_by_poses: false,
@@ -419,18 +331,11 @@ pub static CAUSES: &[&Cause] = &[
         sentence: "the axis of {place} tilts as the joint turns",
         // It stands where an outer ring is not round, and turns with the joint where an inner one is not. No bearing lets it tilt by 400
         // arcsec.
-        laws: &[LawRow {
-            at: At::Axes,
-            follows: Waves(Turning::Joint, [1, 2], false),
-            tried: || *WOBBLES,
-            rarity: || *RARE,
-            largest: 2e-3,
-            ..PLAIN
-        }],
-        measure: Some(Measure {
-            rank: 6,
-            advice: "measure a second target off the first",
-        }),
+        laws: &[
+            row!(PLAIN, at: At::Axes, follows: Waves(Turning::Joint, [1, 2], false), tried: || *WOBBLES, rarity: || *RARE,
+                largest: 2e-3),
+        ],
+        measure: measure!(6: "measure a second target off the first"),
         ..Cause::PLAIN
     },
     &Cause {
@@ -442,14 +347,9 @@ pub static CAUSES: &[&Cause] = &[
         needs: "joint velocities, of a moving arm",
         sentence: "{place} trails behind in proportion to its speed, by {1:2} {unit}",
         // Viscous friction winds the gear up: c is its coefficient over the gear's stiffness, s. A joint that trails by 0.1 s is not driven.
-        laws: &[LawRow {
-            at: At::AllJoints,
-            follows: Velocity,
-            positive: true,
-            largest: 0.1,
-            number: "trail",
-            ..PLAIN
-        }],
+        laws: &[
+            row!(PLAIN, at: At::AllJoints, follows: Velocity, positive: true, largest: 0.1, number: "trail"),
+        ],
         // A joint that trails by less than 5 arcsec for each deg/s is no cause to measure again.
         hidden: Some(|| HiddenSize {
             subject: None,
@@ -467,13 +367,7 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "base_shift (joint 1), tool_shift (last joint)",
         needs: "rows in the order of measurement",
         sentence: "the zero of {place} steps by {size}{when}",
-        laws: &[LawRow {
-            at: At::AllJoints,
-            follows: Step,
-            number: "step",
-            sigma: 0.1,
-            ..PLAIN
-        }],
+        laws: &[row!(PLAIN, at: At::AllJoints, follows: Step, number: "step", sigma: 0.1)],
         measure: Some(law_shapes::RETURN),
         separable_by_poses: false,
         same: |term| {
@@ -489,11 +383,7 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "zero_shift of the last joints",
         needs: "rows in the order of measurement",
         sentence: "the target on the tool has moved{when}",
-        laws: &[LawRow {
-            at: At::Tool,
-            follows: Step,
-            ..PLAIN
-        }],
+        laws: &[row!(PLAIN, at: At::Tool, follows: Step)],
         measure: Some(law_shapes::RETURN),
         separable_by_poses: false,
         ..Cause::PLAIN
@@ -506,11 +396,7 @@ pub static CAUSES: &[&Cause] = &[
         confounded: "zero_shift of joint 1, tracker_drift",
         needs: "rows in the order of measurement",
         sentence: "the base (or the tracker) has moved{when}",
-        laws: &[LawRow {
-            at: At::Base(&[Axes::Place, Axes::Both]),
-            follows: Step,
-            ..PLAIN
-        }],
+        laws: &[row!(PLAIN, at: At::Base(&[Axes::Place, Axes::Both]), follows: Step)],
         measure: Some(law_shapes::RETURN),
         of_the_measurement: true,
         separable_by_poses: false,
@@ -525,25 +411,10 @@ pub static CAUSES: &[&Cause] = &[
         needs: "time",
         sentence: "the tracker's frame drifts slowly{rows}",
         laws: &[
-            LawRow {
-                follows: Steady,
-                tried: || 3,
-                says: "the tracker's frame drifts {pace}{rows}",
-                ..DRIFT
-            },
-            LawRow {
-                follows: Follows::Warmth(&[Temperature, WarmUp]),
-                tried: || 3,
-                rarity: || *RARE,
-                says: "the tracker's frame drifts with the warm-up{rows}",
-                ..DRIFT
-            },
-            LawRow {
-                at: At::Tracker(&[Axes::Place]),
-                follows: Slow,
-                rarity: || *RARE,
-                ..DRIFT
-            },
+            row!(DRIFT, follows: Steady, tried: || 3, says: "the tracker's frame drifts {pace}{rows}"),
+            row!(DRIFT, follows: Follows::Warmth(&[Temperature, WarmUp]), tried: || 3, rarity: || *RARE,
+                says: "the tracker's frame drifts with the warm-up{rows}"),
+            row!(DRIFT, at: At::Tracker(&[Axes::Place]), follows: Slow, rarity: || *RARE),
         ],
         measure: Some(WATCH),
         of_the_measurement: true,
@@ -569,13 +440,9 @@ pub static CAUSES: &[&Cause] = &[
         needs: "points measured from outside the arm's reach, the instrument at the recording's origin",
         sentence: "the tracker's azimuths err periodically: {each}",
         // The horizontal circle sits off its axis, or is out of round.
-        laws: &[LawRow {
-            at: At::Reading(Polar::Azimuth),
-            follows: Waves(Turning::Azimuth, [1, 2], false),
-            tried: || 2,
-            says: ORDER,
-            ..CIRCLE
-        }],
+        laws: &[
+            row!(CIRCLE, at: At::Reading(Polar::Azimuth), follows: Waves(Turning::Azimuth, [1, 2], false), tried: || 2, says: ORDER),
+        ],
         measure: Some(TWO_FACES),
         of_the_measurement: true,
         ..Cause::PLAIN
@@ -590,21 +457,10 @@ pub static CAUSES: &[&Cause] = &[
         sentence: "the tracker's head errs with the elevation: {each}",
         // The head sags, or its vertical circle sits off its axis; a transit axis that is not level turns the azimuth.
         laws: &[
-            LawRow {
-                at: At::Reading(Polar::Elevation),
-                follows: Waves(Turning::Elevation, [1, 2], false),
-                tried: || 3,
-                says: "elevations by {amplitude}",
-                ..CIRCLE
-            },
-            LawRow {
-                at: At::Reading(Polar::Azimuth),
-                follows: Waves(Turning::Elevation, [1, 1], false),
-                tried: || 3,
-                variant: "transit",
-                says: "azimuths by {amplitude}",
-                ..CIRCLE
-            },
+            row!(CIRCLE, at: At::Reading(Polar::Elevation), follows: Waves(Turning::Elevation, [1, 2], false), tried: || 3,
+                says: "elevations by {amplitude}"),
+            row!(CIRCLE, at: At::Reading(Polar::Azimuth), follows: Waves(Turning::Elevation, [1, 1], false), tried: || 3,
+                variant: "transit", says: "azimuths by {amplitude}"),
         ],
         measure: Some(TWO_FACES),
         of_the_measurement: true,
@@ -619,17 +475,10 @@ pub static CAUSES: &[&Cause] = &[
         needs: "points measured from outside the arm's reach, the instrument at the recording's origin",
         sentence: "every range of the tracker is wrong by {1e3:0} um",
         // A dead path, or the constant of another reflector.
-        laws: &[LawRow {
-            at: At::Reading(Polar::Range),
-            follows: Constant,
-            rarity: || *RARE,
-            number: "offset",
-            ..PLAIN
-        }],
-        measure: Some(Measure {
-            rank: 2,
-            advice: "measure a line of three points from within it and from its end",
-        }),
+        laws: &[
+            row!(PLAIN, at: At::Reading(Polar::Range), follows: Constant, rarity: || *RARE, number: "offset"),
+        ],
+        measure: measure!(2: "measure a line of three points from within it and from its end"),
         of_the_measurement: true,
         ..Cause::PLAIN
     },
@@ -644,30 +493,11 @@ pub static CAUSES: &[&Cause] = &[
         // Air changes by 1e-6 a kelvin; five times that, since the temperature that was logged need not be that along the beam, and no air in
         // a hall warms up by more than 30 K. More than twice that again is a weather station with a fault.
         laws: &[
-            LawRow {
-                follows: Follows::Warmth(&[Temperature]),
-                largest: 1e-5,
-                limit: Some(Limit {
-                    most: 5e-6,
-                    ..OF_AIR
-                }),
-                ..AIR
-            },
-            LawRow {
-                follows: Follows::Warmth(&[WarmUp]),
-                largest: 3e-4,
-                limit: Some(Limit {
-                    most: 30.0 * 5e-6,
-                    ..OF_AIR
-                }),
-                says: "the tracker's ranges grow as the air warms up, by {1e6:1} um/m in the end with a time constant of {span}",
-                ..AIR
-            },
+            row!(AIR, follows: Follows::Warmth(&[Temperature]), largest: 1e-5, limit: Some(Limit { most: 5e-6, ..OF_AIR })),
+            row!(AIR, follows: Follows::Warmth(&[WarmUp]), largest: 3e-4, limit: Some(Limit { most: 30.0 * 5e-6, ..OF_AIR }),
+                says: "the tracker's ranges grow as the air warms up, by {1e6:1} um/m in the end with a time constant of {span}"),
         ],
-        measure: Some(Measure {
-            rank: 2,
-            advice: "log the air's temperature and measure a fixed point on the floor now and then",
-        }),
+        measure: measure!(2: "log the air's temperature and measure a fixed point on the floor now and then"),
         of_the_measurement: true,
         separable_by_poses: false,
         ..Cause::PLAIN

@@ -6,66 +6,108 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A scalar of a row; joints count from 0 here and from 1 in words.
-#[expect(missing_docs, reason = "a field is documented with its variable")]
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Variable {
+/// Declares the variables, a row each: what it is of, the column of the table of causes to which it belongs, its words, and its value in a row
+/// (component `k` of several); `None` where the row does not tell.
+macro_rules! variables {
+    (|$k:ident, $robot:ident, $state:ident|
+     $( $(#[$meta:meta])* $name:ident $({ $($field:ident: $type:ty),+ })? $kind:literal ($($words:tt)+) => $value:expr; )+) => {
+        /// A scalar of a row; joints count from 0 here and from 1 in words.
+        #[expect(missing_docs, reason = "a field is documented with its variable")]
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+        #[serde(rename_all = "snake_case")]
+        pub enum Variable { $( $(#[$meta])* $name $({ $($field: $type),+ })?, )+ }
+
+        #[allow(unused_variables, reason = "a row uses some of its numbers here, some there")]
+        impl Variable {
+            fn column(self) -> &'static str {
+                match self { $( Self::$name $({ $($field),+ })? => $kind, )+ }
+            }
+
+            /// One of its numbers in a row; `None` where the row does not tell.
+            pub(super) fn value(self, $k: usize, $robot: &RobotModel, $state: &ArmState) -> Option<f64> {
+                match self { $( Self::$name $({ $($field),+ })? => $value, )+ }
+            }
+        }
+
+        #[allow(unused_variables, reason = "a row uses some of its numbers here, some there")]
+        impl fmt::Display for Variable {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                match *self { $( Self::$name $({ $($field),+ })? => write!(f, $($words)+), )+ }
+            }
+        }
+    };
+}
+
+variables! { |k, robot, state|
     /// Commanded position of a joint, rad or m.
-    Angle { joint: usize },
+    Angle { joint: usize } "angle" ("q{}", joint + 1) => Some(state.q[joint]);
     /// Angle of a joint's motor, rad: the joint's angle times its reduction ratio.
-    Motor { joint: usize },
+    Motor { joint: usize } "angle" ("motor {}", joint + 1)
+        => Some(robot.description().joints[joint].reduction_ratio.unwrap_or(0.0) * state.q[joint]);
     /// Load torque about a joint, Nm.
-    Load { joint: usize },
+    Load { joint: usize } "load" ("load of joint {}", joint + 1) => Some(state.posture.torque[joint]);
     /// Load torque plus so much friction (Nm) to the side from which the joint came, Nm.
-    Push { joint: usize, friction_nm: f64 },
+    Push { joint: usize, friction_nm: f64 } "load" ("approach of joint {}", joint + 1)
+        => Some(state.posture.torque[joint] + friction_nm * state.direction(joint));
     /// Motor current of a joint, A, where recorded.
-    Current { joint: usize },
+    Current { joint: usize } "load" ("current of joint {}", joint + 1)
+        => state.current().map(|all| all[joint]).filter(|current| current.is_finite());
     /// Side from which a joint came to rest, +1 or -1; 0 if it never moved.
-    Approach { joint: usize },
+    Approach { joint: usize } "approach" ("approach of joint {}", joint + 1) => Some(state.direction(joint));
     /// What a joint moved from the stop before, rad or m.
-    Move { joint: usize },
+    Move { joint: usize } "travel" ("last move of joint {}", joint + 1) => Some(state.last_move(joint));
     /// Velocity of a joint, rad/s or m/s; 0 where the arm stood.
-    Velocity { joint: usize },
+    Velocity { joint: usize } "speed" ("speed of joint {}", joint + 1) => Some(state.data.velocity(state.row, joint));
     /// Declared payload, kg.
-    Payload,
+    Payload "payload" ("payload") => Some(state.data.payload[state.row]);
     /// Direction of gravity as the tool sees it: one component (0 to 2, axes of the tool at the zero pose), or all three.
-    Gravity { axis: Option<usize> },
+    Gravity { axis: Option<usize> } "load" ("direction of gravity")
+        => state.posture.down(state.q.len()).map(|down| down[axis.unwrap_or(k)]);
     /// C, where recorded.
-    Temperature,
+    Temperature "temperature" ("temperature") => state.data.temperature(state.row);
     /// s, or the number of the row where the recording has no clock: see `ArmState::time`.
-    Time,
+    Time "time" ("time") => Some(state.time());
     /// A circumstance that the recording declares and laws read by name, SI.
-    Circumstance {
-        column: CircumstanceName,
-        joint: Option<usize>,
-    },
+    Circumstance { column: CircumstanceName, joint: Option<usize> } "circumstance" ("{}{}", column.text(), of_joint(joint))
+        => state.data.circumstance(column.text(), state.row, joint);
     /// Moments of all that the arm carries: of effects that are no law of one scalar.
-    ArmLoad,
+    ArmLoad "load" ("load of the arm") => None;
     /// What each joint moved from the row before.
-    LastMove,
+    LastMove "travel" ("last move") => None;
     /// Velocities of all joints together.
-    Speed,
+    Speed "speed" ("speed") => None;
     /// Azimuth about the instrument's standing axis, rad.
-    Azimuth,
+    Azimuth "position" ("azimuth") => Some(state.sight().azimuth);
     /// Elevation above the instrument's horizon, rad.
-    Elevation,
+    Elevation "position" ("elevation") => Some(state.sight().elevation);
     /// Distance from the instrument, m.
-    Range,
+    Range "position" ("range") => Some(state.sight().range);
     /// Side to which pre-sliding friction has brought a joint that fades in over a travel (rad or m) after each reversal, -1 to 1.
-    Slip { joint: usize, travel: f64 },
+    Slip { joint: usize, travel: f64 } "travel" ("travel of joint {} since it reversed", joint + 1)
+        => Some(state.data.memory(Memory::Slip { joint, travel }, state.row));
     /// How far what sticks beside a joint is stretched by its travel until it slips at a limit (rad or m), rad or m.
-    Stretch { joint: usize, limit: f64 },
+    Stretch { joint: usize, limit: f64 } "travel"
+        ("travel of joint {} that sticks up to {:.1} deg", joint + 1, limit.to_degrees())
+        => Some(state.data.memory(Memory::Stretch { joint, limit }, state.row));
     /// Travel of a joint of late (rad or m), which fades with a time (s).
-    Recent { joint: usize, time: f64 },
+    Recent { joint: usize, time: f64 } "travel" ("travel of joint {} in the last {time:.0} s", joint + 1)
+        => Some(state.data.memory(Memory::Recent { joint, time }, state.row));
     /// Where the tool is along a direction of the base frame, m.
-    Position { along: [f64; 3] },
+    Position { along: [f64; 3] } "position" ("position of the tool along {}", arrow(&along))
+        => Some(Vector3::from(along).dot(&state.posture.tool(robot)));
     /// Where the target is along a direction of the instrument's frame, m.
-    Sighted { along: [f64; 3] },
+    Sighted { along: [f64; 3] } "position" ("position of the target along {} of the instrument", arrow(&along))
+        => Some(Vector3::from(along).dot(&state.point));
     /// How fast a joint has moved of late (rad/s or m/s), forgotten with a cooling time (s).
-    Work { joint: usize, cooling: f64 },
+    Work { joint: usize, cooling: f64 } "speed" ("work of joint {}", joint + 1)
+        => Some(state.data.memory(Memory::Work { joint, cooling }, state.row));
     /// The recorded temperature as something feels it that follows it with a time constant (s), C.
-    Lagging { lag: f64 },
+    Lagging { lag: f64 } "temperature" ("lagging temperature")
+        => state.data.temperature(state.row).map(|_| state.data.memory(Memory::Temperature { lag }, state.row));
+}
+
+fn of_joint(joint: Option<usize>) -> String {
+    joint.map_or_else(String::new, |joint| format!(" of joint {}", joint + 1))
 }
 
 impl Variable {
@@ -82,32 +124,12 @@ impl Variable {
 
     /// The column of the table of causes to which it belongs, of something at a place.
     pub(crate) fn kind(self, place: Place) -> &'static str {
-        match self {
-            Self::Angle { joint } | Self::Motor { joint } => match place {
-                Place::Joint(at) | Place::Links(at, _) if at == joint => "own angle",
-                _ => "other angle",
-            },
-            Self::Load { .. }
-            | Self::Push { .. }
-            | Self::Current { .. }
-            | Self::Gravity { .. }
-            | Self::ArmLoad => "load",
-            Self::Payload => "payload",
-            Self::Approach { .. } => "approach",
-            Self::Move { .. }
-            | Self::Slip { .. }
-            | Self::Stretch { .. }
-            | Self::Recent { .. }
-            | Self::LastMove => "travel",
-            Self::Velocity { .. } | Self::Speed | Self::Work { .. } => "speed",
-            Self::Temperature | Self::Lagging { .. } => "temperature",
-            Self::Time => "time",
-            Self::Azimuth
-            | Self::Elevation
-            | Self::Range
-            | Self::Position { .. }
-            | Self::Sighted { .. } => "position",
-            Self::Circumstance { .. } => "circumstance",
+        match (self.column(), place) {
+            ("angle", Place::Joint(at) | Place::Links(at, _)) if self.joint() == Some(at) => {
+                "own angle"
+            }
+            ("angle", _) => "other angle",
+            (column, _) => column,
         }
     }
 
@@ -176,59 +198,6 @@ impl Variable {
         self.components() == 1 && !matches!(self, Self::ArmLoad | Self::LastMove | Self::Speed)
     }
 
-    /// One of its numbers in a row; `None` where the row does not tell.
-    pub(super) fn value(
-        self,
-        component: usize,
-        robot: &RobotModel,
-        state: &ArmState,
-    ) -> Option<f64> {
-        let remembered = |memory| state.data.memory(memory, state.row);
-        match self {
-            Self::Angle { joint } => Some(state.q[joint]),
-            Self::Motor { joint } => Some(
-                robot.description().joints[joint]
-                    .reduction_ratio
-                    .unwrap_or(0.0)
-                    * state.q[joint],
-            ),
-            Self::Load { joint } => Some(state.posture.torque[joint]),
-            Self::Push { joint, friction_nm } => {
-                Some(state.posture.torque[joint] + friction_nm * state.direction(joint))
-            }
-            Self::Current { joint } => state
-                .current()
-                .map(|all| all[joint])
-                .filter(|current| current.is_finite()),
-            Self::Approach { joint } => Some(state.direction(joint)),
-            Self::Move { joint } => Some(state.last_move(joint)),
-            Self::Velocity { joint } => Some(state.data.velocity(state.row, joint)),
-            Self::Payload => Some(state.data.payload[state.row]),
-            Self::Gravity { axis } => state
-                .posture
-                .down(state.q.len())
-                .map(|down| down[axis.unwrap_or(component)]),
-            Self::Temperature => state.data.temperature(state.row),
-            Self::Time => Some(state.time()),
-            Self::Circumstance { column, joint } => {
-                state.data.circumstance(column.text(), state.row, joint)
-            }
-            Self::Azimuth => Some(state.sight().azimuth),
-            Self::Elevation => Some(state.sight().elevation),
-            Self::Range => Some(state.sight().range),
-            Self::Slip { joint, travel } => Some(remembered(Memory::Slip { joint, travel })),
-            Self::Stretch { joint, limit } => Some(remembered(Memory::Stretch { joint, limit })),
-            Self::Recent { joint, time } => Some(remembered(Memory::Recent { joint, time })),
-            Self::Position { along } => Some(Vector3::from(along).dot(&state.posture.tool(robot))),
-            Self::Sighted { along } => Some(Vector3::from(along).dot(&state.point)),
-            Self::Work { joint, cooling } => Some(remembered(Memory::Work { joint, cooling })),
-            Self::Lagging { lag } => {
-                (state.data.temperature(state.row)).map(|_| remembered(Memory::Temperature { lag }))
-            }
-            Self::ArmLoad | Self::LastMove | Self::Speed => None,
-        }
-    }
-
     /// By how much a value is beyond a range, at most 1: as a share of the range, of a load of its distance from no load.
     pub(super) fn share_beyond(self, value: f64, [low, high]: [f64; 2]) -> f64 {
         let loads = matches!(
@@ -291,62 +260,6 @@ impl Variable {
             self,
             Self::Slip { .. } | Self::Stretch { .. } | Self::Recent { .. }
         )
-    }
-}
-
-impl fmt::Display for Variable {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Angle { joint } => write!(f, "q{}", joint + 1),
-            Self::Motor { joint } => write!(f, "motor {}", joint + 1),
-            Self::Load { joint } => write!(f, "load of joint {}", joint + 1),
-            Self::Push { joint, .. } | Self::Approach { joint } => {
-                write!(f, "approach of joint {}", joint + 1)
-            }
-            Self::Current { joint } => write!(f, "current of joint {}", joint + 1),
-            Self::Move { joint } => write!(f, "last move of joint {}", joint + 1),
-            Self::Velocity { joint } => write!(f, "speed of joint {}", joint + 1),
-            Self::Payload => f.write_str("payload"),
-            Self::Gravity { .. } => f.write_str("direction of gravity"),
-            Self::Temperature => f.write_str("temperature"),
-            Self::Time => f.write_str("time"),
-            Self::Circumstance {
-                column,
-                joint: None,
-            } => f.write_str(column.text()),
-            Self::Circumstance {
-                column,
-                joint: Some(joint),
-            } => write!(f, "{} of joint {}", column.text(), joint + 1),
-            Self::ArmLoad => f.write_str("load of the arm"),
-            Self::LastMove => f.write_str("last move"),
-            Self::Speed => f.write_str("speed"),
-            Self::Azimuth => f.write_str("azimuth"),
-            Self::Elevation => f.write_str("elevation"),
-            Self::Range => f.write_str("range"),
-            Self::Slip { joint, .. } => {
-                write!(f, "travel of joint {} since it reversed", joint + 1)
-            }
-            Self::Stretch { joint, limit } => {
-                write!(
-                    f,
-                    "travel of joint {} that sticks up to {:.1} deg",
-                    joint + 1,
-                    limit.to_degrees()
-                )
-            }
-            Self::Recent { joint, time } => {
-                write!(f, "travel of joint {} in the last {time:.0} s", joint + 1)
-            }
-            Self::Position { along } => write!(f, "position of the tool along {}", arrow(along)),
-            Self::Sighted { along } => write!(
-                f,
-                "position of the target along {} of the instrument",
-                arrow(along)
-            ),
-            Self::Work { joint, .. } => write!(f, "work of joint {}", joint + 1),
-            Self::Lagging { .. } => f.write_str("lagging temperature"),
-        }
     }
 }
 

@@ -1,12 +1,9 @@
 //! What is measured from an anchor whose place is estimated too: distances, and contacts (sockets, planes, spheres) of which nothing is read
 //! but the joints.
 
-use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, RowView, Sensitivity,
-    Weight,
-};
+use super::{Dimension, KindDescription, MeasurementKind, Rank, RowView, Sensitivity, Weight};
 use crate::effect::Closing;
-use crate::robot::{Anchor, Measurements, RobotModel, Shape};
+use crate::robot::{Anchor, Measurements, RobotModel, Shape, columns};
 use crate::spatial::Pose;
 use crate::units::Quantity::Length;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -132,24 +129,11 @@ static DISTANCE: KindDescription = KindDescription {
     word: "distance",
     dimension: Dimension::Length,
     axes: 1,
-    columns: &[
-        DeclaredColumn::value(
-            &["distance"],
-            Length,
-            [1e-6, 200.0],
-            "Distance of the target from an anchor: a draw-wire or ballbar.",
-        ),
-        DeclaredColumn::sigma(
-            &["sigma_distance"],
-            Length,
-            "Standard deviation of the distance.",
-        ),
-        DeclaredColumn::text(
-            "anchor",
-            "Which of several anchors the distance goes to; their places are estimated.",
-        )
-        .as_part(Part::Anchor),
-    ],
+    columns: columns! {
+        value(&["distance"], Length, [1e-6, 200.0]) "Distance of the target from an anchor: a draw-wire or ballbar.";
+        sigma(&["sigma_distance"], Length) "Standard deviation of the distance.";
+        anchor("anchor") "Which of several anchors the distance goes to; their places are estimated.";
+    },
     own_sigma: true,
     rank: Rank {
         places: true,
@@ -250,18 +234,10 @@ static SOCKET: KindDescription = KindDescription {
     name: "socket",
     word: "socket",
     axes: 3,
-    columns: &[
-        DeclaredColumn::text(
-            "socket",
-            "The socket (cone, nest) that the ball on the tool lies in; its centre is estimated.",
-        )
-        .as_part(Part::Anchor),
-        DeclaredColumn::sigma(
-            &["sigma_socket"],
-            Length,
-            "Standard deviation per axis with which the ball comes back to a socket.",
-        ),
-    ],
+    columns: columns! {
+        anchor("socket") "The socket (cone, nest) that the ball on the tool lies in; its centre is estimated.";
+        sigma(&["sigma_socket"], Length) "Standard deviation per axis with which the ball comes back to a socket.";
+    },
     ..CONTACT
 };
 
@@ -333,18 +309,10 @@ const FEWEST_OF_PLANE: usize = 3;
 static PLANE: KindDescription = KindDescription {
     name: "plane",
     word: "plane",
-    columns: &[
-        DeclaredColumn::text(
-            "plane",
-            "The plane that the target touches: a table, the face of a cube; it is estimated.",
-        )
-        .as_part(Part::Anchor),
-        DeclaredColumn::sigma(
-            &["sigma_plane"],
-            Length,
-            "Standard deviation, along its normal, with which a plane is touched.",
-        ),
-    ],
+    columns: columns! {
+        anchor("plane") "The plane that the target touches: a table, the face of a cube; it is estimated.";
+        sigma(&["sigma_plane"], Length) "Standard deviation, along its normal, with which a plane is touched.";
+    },
     ..CONTACT
 };
 
@@ -422,14 +390,10 @@ const FEWEST_OF_SPHERE: usize = 4;
 static SPHERE: KindDescription = KindDescription {
     name: "sphere",
     word: "sphere",
-    columns: &[
-        DeclaredColumn::text(
-            "sphere",
-            "The sphere whose surface the target touches; its centre is estimated, and its radius with that of a ball on the tool.",
-        )
-        .as_part(Part::Anchor),
-        DeclaredColumn::sigma(&["sigma_sphere"], Length, "Standard deviation, along its normal, with which a sphere is touched."),
-    ],
+    columns: columns! {
+        anchor("sphere") "The sphere whose surface the target touches; its centre is estimated, and its radius with that of a ball on the tool.";
+        sigma(&["sigma_sphere"], Length) "Standard deviation, along its normal, with which a sphere is touched.";
+    },
     ..CONTACT
 };
 

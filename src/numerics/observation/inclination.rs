@@ -3,10 +3,8 @@
 //! tilt = asin(up . R e) with up the z axis of the recording's frame, which is levelled (trackers are, by a level of their own), or
 //! where the level is the only instrument defines it. The target's z axis points above the horizon: such instruments work upright.
 
-use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, RowView, Sensitivity, Weight,
-};
-use crate::robot::Measurements;
+use super::{Dimension, KindDescription, MeasurementKind, Rank, RowView, Sensitivity, Weight};
+use crate::robot::{Measurements, columns};
 use crate::units::Quantity::Angle;
 use nalgebra::{Matrix3, Vector3};
 
@@ -23,27 +21,11 @@ static ABOUT: KindDescription = KindDescription {
     word: "inclination",
     dimension: Dimension::Angle,
     axes: 2,
-    columns: &[
-        DeclaredColumn::value(
-            &["tilt_x"],
-            Angle,
-            UPRIGHT,
-            "Angle of the target's x axis above the horizon: a level on the tool.",
-        )
-        .together(BOTH),
-        DeclaredColumn::value(
-            &["tilt_y"],
-            Angle,
-            UPRIGHT,
-            "Angle of the target's y axis above the horizon.",
-        )
-        .together(BOTH),
-        DeclaredColumn::sigma(
-            &["sigma_tilt"],
-            Angle,
-            "Standard deviation of the level's angles.",
-        ),
-    ],
+    columns: columns! {
+        value(&["tilt_x"], Angle, UPRIGHT) "Angle of the target's x axis above the horizon: a level on the tool." with BOTH;
+        value(&["tilt_y"], Angle, UPRIGHT) "Angle of the target's y axis above the horizon." with BOTH;
+        sigma(&["sigma_tilt"], Angle) "Standard deviation of the level's angles.";
+    },
     own_sigma: true,
     rank: Rank {
         places: false,

@@ -3,10 +3,8 @@
 //! u = -y / x to the right, v = -z / x downwards: the frame's x axis is the optical axis, z is up. They are pixels from the principal point
 //! over the focal length, lens distortion taken off. One view sees neither depth nor how large the arm is.
 
-use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Rank, RowView, Sensitivity, Weight,
-};
-use crate::robot::{Measurements, RobotModel};
+use super::{Dimension, KindDescription, MeasurementKind, Rank, RowView, Sensitivity, Weight};
+use crate::robot::{Measurements, RobotModel, columns};
 use crate::spatial::Pose;
 use crate::units::Quantity::Number;
 use nalgebra::{DMatrix, Matrix3, RowVector3, Vector3, Vector4};
@@ -29,20 +27,19 @@ static ABOUT: KindDescription = KindDescription {
     word: "image",
     dimension: Dimension::Angle,
     axes: 2,
-    columns: &[
-        DeclaredColumn::value(
-            &["image_x"],
-            Number,
-            VIEW,
-            "Image x of the target over the focal length, to the right, of a camera that is the recording's frame; no unit.",
-        )
-        .together(BOTH),
-        DeclaredColumn::value(&["image_y"], Number, VIEW, "Image y of the target over the focal length, downwards; no unit.")
-            .together(BOTH),
-        DeclaredColumn::sigma(&["sigma_image"], Number, "Standard deviation of each of the two; no unit."),
-    ],
+    columns: columns! {
+        value(&["image_x"], Number, VIEW)
+            "Image x of the target over the focal length, to the right, of a camera that is the recording's frame; no unit." with BOTH;
+        value(&["image_y"], Number, VIEW) "Image y of the target over the focal length, downwards; no unit." with BOTH;
+        sigma(&["sigma_image"], Number) "Standard deviation of each of the two; no unit.";
+    },
     own_sigma: true,
-    rank: Rank { places: true, rotations: false, scale: false, blind: [0, 0] },
+    rank: Rank {
+        places: true,
+        rotations: false,
+        scale: false,
+        blind: [0, 0],
+    },
     is_screened: false,
 };
 

@@ -1,10 +1,7 @@
 //! Points: where a target is in the tracker's frame, all of its axes or some of them.
 
-use super::{
-    DeclaredColumn, Dimension, KindDescription, MeasurementKind, Part, Rank, RowView, Sensitivity,
-    Weight,
-};
-use crate::robot::Measurements;
+use super::{Dimension, KindDescription, MeasurementKind, Rank, RowView, Sensitivity, Weight};
+use crate::robot::{Measurements, columns};
 use crate::units::Quantity::Length;
 use nalgebra::Vector3;
 
@@ -21,76 +18,27 @@ const TWO: f64 = 2.0;
 /// m; no tracker sees farther.
 const FAR: [f64; 2] = [-200.0, 200.0];
 
-const fn axis(
-    setting: &'static str,
-    stored: &'static [&'static str],
-    about: &'static str,
-) -> DeclaredColumn {
-    DeclaredColumn::number(setting, stored, Length, FAR, about).as_part(Part::Value)
-}
-
-const fn sigma(
-    setting: &'static str,
-    stored: &'static [&'static str],
-    about: &'static str,
-) -> DeclaredColumn {
-    DeclaredColumn::number(setting, stored, Length, [0.0, 1.0], about)
-        .as_part(Part::Sigma)
-        .together(SIGMAS)
-}
-
 static ABOUT: KindDescription = KindDescription {
     name: "point",
     word: "point",
     dimension: Dimension::Length,
     axes: 3,
-    columns: &[
-        axis("x", &["x"], "Measured point, x in the tracker's frame."),
-        axis("y", &["y"], "Measured point, y in the tracker's frame."),
-        axis("z", &["z"], "Measured point, z in the tracker's frame."),
-        sigma("sigma_x", &["sigma_x"], "Standard deviation of x."),
-        sigma("sigma_y", &["sigma_y"], "Standard deviation of y."),
-        sigma("sigma_z", &["sigma_z"], "Standard deviation of z."),
-        DeclaredColumn::uncertainty(
-            "u95",
-            SIGMAS,
-            TWO,
-            "Uncertainty of each coordinate with 95 % coverage: two standard deviations.",
-        ),
-        DeclaredColumn::uncertainty(
-            "u95_x",
-            &["sigma_x"],
-            TWO,
-            "Uncertainty of x with 95 % coverage.",
-        )
-        .together(EXPANDED),
-        DeclaredColumn::uncertainty(
-            "u95_y",
-            &["sigma_y"],
-            TWO,
-            "Uncertainty of y with 95 % coverage.",
-        )
-        .together(EXPANDED),
-        DeclaredColumn::uncertainty(
-            "u95_z",
-            &["sigma_z"],
-            TWO,
-            "Uncertainty of z with 95 % coverage.",
-        )
-        .together(EXPANDED),
-        DeclaredColumn::uncertainty(
-            "u",
-            SIGMAS,
-            1.0,
-            "Standard uncertainty of each coordinate, or with `coverage_factor` an expanded one.",
-        ),
-        DeclaredColumn::uncertainty("u_x", &["sigma_x"], 1.0, "Standard uncertainty of x.")
-            .together(STANDARD),
-        DeclaredColumn::uncertainty("u_y", &["sigma_y"], 1.0, "Standard uncertainty of y.")
-            .together(STANDARD),
-        DeclaredColumn::uncertainty("u_z", &["sigma_z"], 1.0, "Standard uncertainty of z.")
-            .together(STANDARD),
-    ],
+    columns: columns! {
+        value(&["x"], Length, FAR) "Measured point, x in the tracker's frame.";
+        value(&["y"], Length, FAR) "Measured point, y in the tracker's frame.";
+        value(&["z"], Length, FAR) "Measured point, z in the tracker's frame.";
+        sigma(&["sigma_x"], Length) "Standard deviation of x." with SIGMAS;
+        sigma(&["sigma_y"], Length) "Standard deviation of y." with SIGMAS;
+        sigma(&["sigma_z"], Length) "Standard deviation of z." with SIGMAS;
+        uncertainty("u95", SIGMAS, TWO) "Uncertainty of each coordinate with 95 % coverage: two standard deviations.";
+        uncertainty("u95_x", &["sigma_x"], TWO) "Uncertainty of x with 95 % coverage." with EXPANDED;
+        uncertainty("u95_y", &["sigma_y"], TWO) "Uncertainty of y with 95 % coverage." with EXPANDED;
+        uncertainty("u95_z", &["sigma_z"], TWO) "Uncertainty of z with 95 % coverage." with EXPANDED;
+        uncertainty("u", SIGMAS, 1.0) "Standard uncertainty of each coordinate, or with `coverage_factor` an expanded one.";
+        uncertainty("u_x", &["sigma_x"], 1.0) "Standard uncertainty of x." with STANDARD;
+        uncertainty("u_y", &["sigma_y"], 1.0) "Standard uncertainty of y." with STANDARD;
+        uncertainty("u_z", &["sigma_z"], 1.0) "Standard uncertainty of z." with STANDARD;
+    },
     own_sigma: false,
     rank: Rank {
         places: true,

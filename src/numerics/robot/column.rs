@@ -2,7 +2,7 @@
 //!
 //! Circumstances of a measurement, declared once each: what `ingest` calls them, how the recording stores them, whether laws may read them.
 //!
-//! A line with `.in_laws()` is all that a new circumstance takes: it is read, stored, carried to the numerics, and known to declared effects.
+//! A line `in_laws` is all that a new circumstance takes: it is read, stored, carried to the numerics, and known to declared effects.
 
 use crate::units::Quantity::{
     Angle, AngularRate, Current, Force, Length, LinearRate, Mass, Number, Temperature, Time, Torque,
@@ -164,6 +164,48 @@ impl DeclaredColumn {
         }
     }
 
+    /// The name of what the target is measured from.
+    pub(crate) const fn anchor(setting: &'static str, about: &'static str) -> Self {
+        Self::text(setting, about).as_part(Part::Anchor)
+    }
+
+    /// Whole numbers.
+    const fn count(setting: &'static str, about: &'static str) -> Self {
+        Self {
+            shape: ColumnShape::Count,
+            ..Self::text(setting, about)
+        }
+    }
+
+    /// A number for each joint; of prismatic ones perhaps another quantity with a range of its own.
+    const fn of_joints(
+        setting: &'static str,
+        stored: &'static [&'static str],
+        quantity: Quantity,
+        range: [f64; 2],
+        prismatic: Option<(Quantity, [f64; 2])>,
+        about: &'static str,
+    ) -> Self {
+        Self {
+            shape: ColumnShape::Joints { prismatic },
+            ..Self::number(setting, stored, quantity, range, about)
+        }
+    }
+
+    /// A number that declared laws may read by its name.
+    const fn in_laws(
+        setting: &'static str,
+        stored: &'static [&'static str],
+        quantity: Quantity,
+        range: [f64; 2],
+        about: &'static str,
+    ) -> Self {
+        Self {
+            in_laws: true,
+            ..Self::number(setting, stored, quantity, range, about)
+        }
+    }
+
     /// The same as another part of the measurement.
     pub(crate) const fn as_part(self, part: Part) -> Self {
         Self { part, ..self }
@@ -172,14 +214,6 @@ impl DeclaredColumn {
     /// The same, which must be mapped together with these settings.
     pub(crate) const fn together(self, together: &'static [&'static str]) -> Self {
         Self { together, ..self }
-    }
-
-    /// The same, which declared laws may read by its name.
-    pub(crate) const fn in_laws(self) -> Self {
-        Self {
-            in_laws: true,
-            ..self
-        }
     }
 
     /// Whether it has a number for each joint.
@@ -250,148 +284,45 @@ impl DeclaredColumn {
     }
 }
 
-const SIMULATED: &[&str] = &["sim_x", "sim_y", "sim_z"];
-
-const fn simulated(
-    setting: &'static str,
-    stored: &'static [&'static str],
-    about: &'static str,
-) -> DeclaredColumn {
-    DeclaredColumn::number(setting, stored, Length, [-200.0, 200.0], about).together(SIMULATED)
+/// Columns, a row each: a constructor of [`DeclaredColumn`] with what it takes, what people read of it, and the settings of which all are
+/// mapped or none.
+macro_rules! columns {
+    ($($shape:ident($($taken:expr),*) $about:literal $(with $together:expr)?;)*) => {
+        &[$($crate::robot::DeclaredColumn::$shape($($taken,)* $about)$(.together($together))?),*]
+    };
 }
+pub(crate) use columns;
+
+const SIMULATED: &[&str] = &["sim_x", "sim_y", "sim_z"];
+const FAR: [f64; 2] = [-200.0, 200.0];
+const FORCE: Option<(Quantity, [f64; 2])> = Some((Force, [-1e7, 1e7]));
 
 /// Every circumstance, in the order in which people see them.
-pub static CIRCUMSTANCES: &[DeclaredColumn] = &[
-    DeclaredColumn::text(
-        "point_id",
-        "Name of the point; without it rows are called `row 17`.",
-    ),
-    DeclaredColumn {
-        shape: ColumnShape::Count,
-        ..DeclaredColumn::text(
-            "sequence",
-            "Order of the recording, strictly increasing; without it the number of the data row, from 1.",
-        )
-    },
-    DeclaredColumn::text(
-        "usage",
-        "What the recording itself says a row is for, e.g. `fit` or `validate`.",
-    ),
-    DeclaredColumn::text(
-        "trajectory",
-        "Which trajectory of several a row belongs to, of an arm that moves: nothing is filtered from one into the next.",
-    ),
-    DeclaredColumn::text(
-        "target",
-        "Which of several targets on the tool was measured; blank for the robot's tool point.",
-    ),
-    DeclaredColumn::number(
-        "time",
-        &["time"],
-        Time,
-        [-1e15, 1e15],
-        "When the row was recorded.",
-    ),
-    DeclaredColumn::number(
-        "payload",
-        &["payload"],
-        Mass,
-        [0.0, 1e4],
-        "Mass at the tool.",
-    ),
-    DeclaredColumn::number(
-        "temperature",
-        &["temp"],
-        Temperature,
-        [-60.0, 200.0],
-        "Temperature of the arm or of the room.",
-    ),
-    DeclaredColumn::number(
-        "humidity",
-        &["humidity"],
-        Number,
-        [0.0, 100.0],
-        "Relative humidity of the air, percent; no unit.",
-    )
-    .in_laws(),
-    simulated(
-        "sim_x",
-        &["sim_x"],
-        "The same point by another simulation, x in any frame fixed to the robot's base: `diagnose` then looks at measured minus simulated.",
-    ),
-    simulated(
-        "sim_y",
-        &["sim_y"],
-        "The same point by another simulation, y.",
-    ),
-    simulated(
-        "sim_z",
-        &["sim_z"],
-        "The same point by another simulation, z.",
-    ),
-    DeclaredColumn {
-        shape: ColumnShape::Joints {
-            prismatic: Some((Length, [-200.0, 200.0])),
-        },
-        ..DeclaredColumn::number("q", &["q{j}"], Angle, [-20.0, 20.0], "Joint positions.")
-    },
-    DeclaredColumn {
-        shape: ColumnShape::Joints { prismatic: None },
-        ..DeclaredColumn::number(
-            "current",
-            &["i{j}"],
-            Current,
-            [-1e4, 1e4],
-            "Motor currents.",
-        )
-    },
-    DeclaredColumn {
-        shape: ColumnShape::Joints {
-            prismatic: Some((Force, [-1e7, 1e7])),
-        },
-        ..DeclaredColumn::number(
-            "torque",
-            &["tau{j}"],
-            Torque,
-            [-1e7, 1e7],
-            "Joint torques, forces of prismatic joints, by a sensor or as the drive states them.",
-        )
-    },
-    DeclaredColumn {
-        shape: ColumnShape::Joints {
-            prismatic: Some((Force, [-1e7, 1e7])),
-        },
-        ..DeclaredColumn::number(
-            "simulated",
-            &["sim_tau{j}"],
-            Torque,
-            [-1e7, 1e7],
-            "The same by another simulation or by the controller's model, at the joints: `diagnose_torques` then looks at measured minus simulated.",
-        )
-    },
-    DeclaredColumn {
-        shape: ColumnShape::Joints { prismatic: None },
-        ..DeclaredColumn::number(
-            "direction",
-            &["dir{j}"],
-            Number,
-            [-1.0, 1.0],
-            "Direction of the last move of each joint: 1, -1 or 0; no unit.",
-        )
-    },
-    DeclaredColumn {
-        shape: ColumnShape::Joints {
-            prismatic: Some((LinearRate, [-100.0, 100.0])),
-        },
-        ..DeclaredColumn::number(
-            "velocity",
-            &["dq{j}"],
-            AngularRate,
-            [-100.0, 100.0],
-            "Joint velocities while the point was measured, where the arm moved: `{column: \"dq{j}\", unit: deg/s}`.",
-        )
-    },
-];
+pub static CIRCUMSTANCES: &[DeclaredColumn] = columns! {
+    text("point_id") "Name of the point; without it rows are called `row 17`.";
+    count("sequence") "Order of the recording, strictly increasing; without it the number of the data row, from 1.";
+    text("usage") "What the recording itself says a row is for, e.g. `fit` or `validate`.";
+    text("trajectory") "Which trajectory of several a row belongs to, of an arm that moves: nothing is filtered from one into the next.";
+    text("target") "Which of several targets on the tool was measured; blank for the robot's tool point.";
+    number("time", &["time"], Time, [-1e15, 1e15]) "When the row was recorded.";
+    number("payload", &["payload"], Mass, [0.0, 1e4]) "Mass at the tool.";
+    number("temperature", &["temp"], Temperature, [-60.0, 200.0]) "Temperature of the arm or of the room.";
+    in_laws("humidity", &["humidity"], Number, [0.0, 100.0]) "Relative humidity of the air, percent; no unit.";
+    number("sim_x", &["sim_x"], Length, FAR)
+        "The same point by another simulation, x in any frame fixed to the robot's base: `diagnose` then looks at measured minus simulated."
+        with SIMULATED;
+    number("sim_y", &["sim_y"], Length, FAR) "The same point by another simulation, y." with SIMULATED;
+    number("sim_z", &["sim_z"], Length, FAR) "The same point by another simulation, z." with SIMULATED;
+    of_joints("q", &["q{j}"], Angle, [-20.0, 20.0], Some((Length, FAR))) "Joint positions.";
+    of_joints("current", &["i{j}"], Current, [-1e4, 1e4], None) "Motor currents.";
+    of_joints("torque", &["tau{j}"], Torque, [-1e7, 1e7], FORCE)
+        "Joint torques, forces of prismatic joints, by a sensor or as the drive states them.";
+    of_joints("simulated", &["sim_tau{j}"], Torque, [-1e7, 1e7], FORCE)
+        "The same by another simulation or by the controller's model, at the joints: `diagnose_torques` then looks at measured minus simulated.";
+    of_joints("direction", &["dir{j}"], Number, [-1.0, 1.0], None) "Direction of the last move of each joint: 1, -1 or 0; no unit.";
+    of_joints("velocity", &["dq{j}"], AngularRate, [-100.0, 100.0], Some((LinearRate, [-100.0, 100.0])))
+        "Joint velocities while the point was measured, where the arm moved: `{column: \"dq{j}\", unit: deg/s}`.";
+};
 
 /// The setting of a circumstance that laws may read; read from text, it is one that is declared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -3,6 +3,7 @@
 //! One sigma of every axis is (constant + per_metre * range) / coverage. Where a maker states a maximum permissible error (MPE) the
 //! divisor is 2: makers call half of it typical (Leica AT500 manual, 2.8.1). A calibration certificate says more than any of these.
 
+use calib_foundation::named;
 use nalgebra::Vector3;
 
 /// Noise of a point by its range.
@@ -30,55 +31,25 @@ pub struct PublishedInstrument {
     pub source: &'static str,
 }
 
-const fn published(
-    name: &'static str,
-    [constant_um, per_metre_um, coverage]: [f64; 3],
-    source: &'static str,
-) -> PublishedInstrument {
-    PublishedInstrument {
-        name,
-        figures: Instrument {
-            constant_um,
-            per_metre_um,
-            coverage,
-        },
-        source,
-    }
+macro_rules! instruments {
+    ($($name:ident [$constant_um:literal, $per_metre_um:literal, $coverage:literal] $source:literal;)+) => {
+        /// What may be named, one line each: constant part (um), growth (um/m) and divisor, and where they stand.
+        pub const INSTRUMENTS: &[PublishedInstrument] = &[$(PublishedInstrument {
+            name: stringify!($name),
+            figures: Instrument { constant_um: $constant_um, per_metre_um: $per_metre_um, coverage: $coverage },
+            source: $source,
+        }),+];
+    };
 }
 
-/// What may be named, one line each: constant part (um), growth (um/m) and divisor, and where they stand.
-pub const INSTRUMENTS: &[PublishedInstrument] = &[
-    published(
-        "api_radian",
-        [10.0, 5.0, 2.0],
-        "API, Radian series, data sheet: static point 10 um + 5 um/m, two sigma",
-    ),
-    published(
-        "faro_vantage",
-        [20.0, 5.0, 2.0],
-        "FARO, Vantage laser trackers, technical sheet: transverse 20 um + 5 um/m, MPE",
-    ),
-    published(
-        "leica_at402",
-        [15.0, 6.0, 2.0],
-        "Leica, AT402, product sheet: U(x, y, z) 15 um + 6 um/m, MPE",
-    ),
-    published(
-        "leica_at500",
-        [15.0, 6.0, 2.0],
-        "Leica, AT500, user manual, 2.8.2: transverse 15 um + 6 um/m, MPE by ISO 10360-10:2021",
-    ),
-    published(
-        "leica_at960",
-        [15.0, 6.0, 2.0],
-        "Leica, AT960, product sheet: U(x, y, z) 15 um + 6 um/m, MPE",
-    ),
-    published(
-        "mocap_optitrack",
-        [100.0, 0.0, 2.0],
-        "OptiTrack, PrimeX 41, data sheet: 3-D accuracy +-0.10 mm; its extreme counts as MPE",
-    ),
-];
+instruments! {
+    api_radian [10.0, 5.0, 2.0] "API, Radian series, data sheet: static point 10 um + 5 um/m, two sigma";
+    faro_vantage [20.0, 5.0, 2.0] "FARO, Vantage laser trackers, technical sheet: transverse 20 um + 5 um/m, MPE";
+    leica_at402 [15.0, 6.0, 2.0] "Leica, AT402, product sheet: U(x, y, z) 15 um + 6 um/m, MPE";
+    leica_at500 [15.0, 6.0, 2.0] "Leica, AT500, user manual, 2.8.2: transverse 15 um + 6 um/m, MPE by ISO 10360-10:2021";
+    leica_at960 [15.0, 6.0, 2.0] "Leica, AT960, product sheet: U(x, y, z) 15 um + 6 um/m, MPE";
+    mocap_optitrack [100.0, 0.0, 2.0] "OptiTrack, PrimeX 41, data sheet: 3-D accuracy +-0.10 mm; its extreme counts as MPE";
+}
 
 /// The weight to start from where a recording states neither standard deviations nor an instrument: a laser tracker of 10 um + 2.5 um/m,
 /// two sigma (Wang et al. 2020, Sec. 6). How far such points scatter is then inferred from what a model leaves.
@@ -112,58 +83,37 @@ impl Instrument {
     }
 }
 
-/// Where the standard deviation of a row's point comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum SigmaSource {
-    /// The recording states it.
-    Recorded,
-    /// By the instrument that was named.
-    Instrument,
-    /// Neither: [`START`].
-    Inferred,
-}
-
-impl SigmaSource {
-    /// All of them, in order of preference.
-    pub const ALL: [Self; 3] = [Self::Recorded, Self::Instrument, Self::Inferred];
-
-    /// As tables hold it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Recorded => "recorded",
-            Self::Instrument => "instrument",
-            Self::Inferred => "inferred",
-        }
+named! {
+    /// Where the standard deviation of a row's point comes from.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum SigmaSource {
+        /// The recording states it.
+        Recorded "recorded",
+        /// By the instrument that was named.
+        Instrument "instrument",
+        /// Neither: [`START`].
+        Inferred "inferred",
     }
 }
 
-/// What figures of noise rest on, the firmest first.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum NoiseBasis {
-    /// Poses that were measured again.
-    Repeats,
-    /// Standard deviations that were recorded, or an instrument that was stated.
-    #[default]
-    Instrument,
-    /// What a model leaves.
-    Inferred,
+named! {
+    /// What figures of noise rest on, the firmest first.
+    #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum NoiseBasis {
+        /// Poses that were measured again.
+        Repeats "repeats",
+        /// Standard deviations that were recorded, or an instrument that was stated.
+        #[default]
+        Instrument "instrument",
+        /// What a model leaves.
+        Inferred "inferred",
+    }
 }
 
 impl NoiseBasis {
-    /// All of them, in order of preference.
-    pub(crate) const ALL: [Self; 3] = [Self::Repeats, Self::Instrument, Self::Inferred];
-
-    /// As tables hold it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Repeats => "repeats",
-            Self::Instrument => "instrument",
-            Self::Inferred => "inferred",
-        }
-    }
-
     /// The basis of a name in a table.
     pub fn parse(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|basis| basis.name() == name)
+        let mut all = Self::ALL.iter().copied();
+        all.find(|basis| basis.name() == name)
     }
 }

@@ -14,6 +14,7 @@ mod readings;
 mod rows;
 mod setup;
 
+pub(crate) use column::columns;
 pub use column::{
     CIRCUMSTANCES, CircumstanceName, ColumnShape, Convention, Conventions, DeclaredColumn, Part,
     law_columns,

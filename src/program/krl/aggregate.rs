@@ -128,7 +128,7 @@ impl<'t, 'p> Aggregate<'t, 'p> {
 
     /// The number of a field, in capitals, where it is one.
     pub fn number(&self, name: &str) -> Option<f64> {
-        let is = |field: &&&[Token]| field.first().is_some_and(|first| first.is_word(&[name]));
+        let is = |field: &&&[Token]| field.first().is_some_and(|first| first.is_word(name));
         number(&self.fields.iter().find(is)?[1..]).map(|(number, _)| number)
     }
 

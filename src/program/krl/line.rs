@@ -9,14 +9,14 @@ const PREDEFINED: [&str; 11] = [
 ];
 
 /// How many of these words a line begins with, and what follows them.
-fn behind<'t, 'p>(line: &'t [Token<'p>], words: &[&str]) -> (usize, &'t [Token<'p>]) {
+fn behind<'t, 'p>(line: &'t [Token<'p>], words: &str) -> (usize, &'t [Token<'p>]) {
     let count = line.iter().take_while(|token| token.is_word(words)).count();
     (count, &line[count..])
 }
 
 /// The type and the names that a line declares, in capitals.
 pub(super) fn declared(line: &[Token]) -> Option<(String, Vec<String>)> {
-    let (skipped, tail) = behind(line, &["DECL", "GLOBAL", "CONST"]);
+    let (skipped, tail) = behind(line, "DECL GLOBAL CONST");
     let [kind, first, ..] = tail else { return None };
     let plain = tail
         .get(2)
@@ -41,8 +41,8 @@ pub(super) fn declared(line: &[Token]) -> Option<(String, Vec<String>)> {
 
 /// The type that a line declares as a structure: `[GLOBAL] STRUC NAME ...`.
 pub(super) fn structure(line: &[Token]) -> Option<String> {
-    match behind(line, &["GLOBAL"]).1 {
-        [word, name, ..] if word.is_word(&["STRUC"]) && name.sort == TokenKind::Word => {
+    match behind(line, "GLOBAL").1 {
+        [word, name, ..] if word.is_word("STRUC") && name.sort == TokenKind::Word => {
             Some(name.upper())
         }
         _ => None,
@@ -102,18 +102,10 @@ pub(super) fn called(line: &[Token]) -> impl Iterator<Item = String> {
 }
 
 /// Heads of lines behind whose `DEF` a routine begins.
-const ROUTINES: [&str; 2] = ["DEF", "DEFFCT"];
+const ROUTINES: &str = "DEF DEFFCT";
 
 /// What such lines name runs at another time.
-const DECLARING: [&str; 7] = [
-    "EXT",
-    "EXTFCT",
-    "EXTP",
-    "EXTFCTP",
-    "INTERRUPT",
-    "GLOBAL",
-    "TRIGGER",
-];
+const DECLARING: &str = "EXT EXTFCT EXTP EXTFCTP INTERRUPT GLOBAL TRIGGER";
 
 /// The routines of a file, in capitals.
 pub(super) fn routines(lines: &[&[Token]]) -> Vec<String> {
@@ -129,7 +121,7 @@ pub(super) fn steps(lines: &[&[Token]], sets: impl Fn(&[Token]) -> bool) -> Vec<
     let routines = routines(lines);
     let of_line = |line: &&[Token]| {
         let step = step(line);
-        let none = matches!(step, FlowStep::Routine(_)) || line[0].is_word(&DECLARING);
+        let none = matches!(step, FlowStep::Routine(_)) || line[0].is_word(DECLARING);
         let calls = called(line).filter(|name| !none && routines.contains(name));
         FlowLine {
             calls: calls.collect(),
@@ -144,7 +136,7 @@ pub(super) fn step(line: &[Token]) -> FlowStep {
     let word = line[0].upper();
     let second = line.get(1).map(Token::upper).unwrap_or_default();
     let mut heads = line.iter().take(3);
-    if let Some(at) = heads.position(|token| token.is_word(&ROUTINES)) {
+    if let Some(at) = heads.position(|token| token.is_word(ROUTINES)) {
         // A function has its type before its name.
         let mut pairs = line[at + 1..].windows(2);
         let name = pairs.find(|w| w[1].is(b'(')).map(|w| w[0].upper());

@@ -48,19 +48,10 @@ const MOTIONS: [(&str, usize); 7] = [
 ];
 
 /// What moves by a distance, or no axis of the robot.
-const LEFT: [&str; 8] = [
-    "PTP_REL",
-    "LIN_REL",
-    "CIRC_REL",
-    "SPTP_REL",
-    "SLIN_REL",
-    "SCIRC_REL",
-    "SPL_REL",
-    "ASYPTP",
-];
+const LEFT: &str = "PTP_REL LIN_REL CIRC_REL SPTP_REL SLIN_REL SCIRC_REL SPL_REL ASYPTP";
 
 /// What may stand behind a position: how it is blended.
-const BLENDING: [&str; 5] = ["C_PTP", "C_DIS", "C_ORI", "C_VEL", "C_SPL"];
+const BLENDING: &str = "C_PTP C_DIS C_ORI C_VEL C_SPL";
 
 const NO_POSITION: &str = "an aggregate that is no position of this motion";
 
@@ -80,7 +71,7 @@ const FRAME_TABLES: [&str; 2] = ["BASE_DATA", "TOOL_DATA"];
 
 /// How many positions a line moves to, where it is a motion.
 fn motion(line: &[Token]) -> Option<usize> {
-    let head = |(name, _): &(&str, usize)| line[0].is_word(&[name]);
+    let head = |(name, _): &(&str, usize)| line[0].is_word(name);
     let (_, positions) = MOTIONS.into_iter().find(head)?;
     // `PTP = 3` names a variable.
     (!line.get(1).is_some_and(|next| next.is(b'='))).then_some(positions)
@@ -88,7 +79,7 @@ fn motion(line: &[Token]) -> Option<usize> {
 
 /// A motion without what stands behind its `WITH`.
 fn before_with<'t, 'p>(line: &'t [Token<'p>]) -> &'t [Token<'p>] {
-    let with = line.iter().position(|token| token.is_word(&["WITH"]));
+    let with = line.iter().position(|token| token.is_word("WITH"));
     &line[..with.unwrap_or(line.len())]
 }
 
@@ -148,7 +139,7 @@ impl Reader {
             return;
         }
         let head = line[0].upper();
-        if LEFT.contains(&head.as_str()) {
+        if line[0].is_word(LEFT) {
             if head.ends_with("_REL") {
                 let message = format!(
                     "left as it is: {head} moves by a distance from where the target before, as corrected, has led"
@@ -185,7 +176,7 @@ impl Reader {
             }
             let close = closing(line, k);
             let behind = line.get(close + 1).filter(|_| close + 1 < end);
-            let follows = |next: &&Token| !(next.is(b',') || next.is_word(&BLENDING));
+            let follows = |next: &&Token| !(next.is(b',') || next.is_word(BLENDING));
             if !begins || operand >= positions || depth != 0 {
                 self.found.fault(token.start, NO_POSITION);
             } else if let Some(stray) = behind.filter(follows) {
@@ -227,8 +218,8 @@ impl Reader {
 
     /// Where a geometric operator stands.
     fn geometric(line: &[Token]) -> Option<usize> {
-        let heads = ["DEF", "DEFFCT", "EXT", "EXTFCT", "EXTP", "EXTFCTP"];
-        if line.len() == 2 || line.iter().any(|token| token.is_word(&heads)) {
+        let heads = "DEF DEFFCT EXT EXTFCT EXTP EXTFCTP";
+        if line.len() == 2 || line.iter().any(|token| token.is_word(heads)) {
             return None;
         }
         let mut depth = 0;
@@ -351,7 +342,7 @@ impl Reader {
                 Some((_, Some(kind))) => aggregate.take(kind, &mut self.found),
                 Some((name, None)) => self.of_other_type(name, inner),
                 // The centre of mass and the inertia of a LOAD.
-                None if tokens[k - 1].is_word(&["CM", "J"]) => {}
+                None if tokens[k - 1].is_word("CM J") => {}
                 None if aggregate.is_frame() => {
                     let message = "left as it is: read as a FRAME inside a structure";
                     self.found.warn(at, message);

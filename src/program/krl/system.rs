@@ -20,9 +20,7 @@ use std::collections::BTreeMap;
 const OF_A_POINT: [&str; 5] = ["FRAMES", "PTP_PARAMS", "CP_PARAMS", "PTP_DAT", "CP_DAT"];
 
 /// Heads of lines that name a routine and do not call it.
-const DECLARING: [&str; 7] = [
-    "DEF", "DEFFCT", "GLOBAL", "EXT", "EXTFCT", "EXTP", "EXTFCTP",
-];
+const DECLARING: &str = "DEF DEFFCT GLOBAL EXT EXTFCT EXTP EXTFCTP";
 
 /// What an inline form says of its point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -169,21 +167,13 @@ impl SystemData {
 
     /// Whether a line sets what is in force.
     pub fn sets(&self, line: &[Token]) -> bool {
-        const SET: [&str; 7] = [
-            "$BASE",
-            "$TOOL",
-            "$LOAD",
-            "$IPO_MODE",
-            "$ROBROOT",
-            "FDAT_ACT",
-            "BAS",
-        ];
-        line[0].is_word(&SET) || self.called(line).is_some()
+        const SET: &str = "$BASE $TOOL $LOAD $IPO_MODE $ROBROOT FDAT_ACT BAS";
+        line[0].is_word(SET) || self.called(line).is_some()
     }
 
     /// The routine of another file that a line calls, by itself or within an expression, where that one sets what is in force.
     fn called(&self, line: &[Token]) -> Option<String> {
-        let mut calls = called(line).filter(|_| !line[0].is_word(&DECLARING));
+        let mut calls = called(line).filter(|_| !line[0].is_word(DECLARING));
         calls.find(|name| self.routines.get(name) == Some(&true))
     }
 
@@ -196,7 +186,7 @@ impl SystemData {
 
     /// Takes a state through a line; `place`: how people find it.
     fn take(&self, line: &[Token], place: &str, state: &mut SystemState) {
-        if line[0].is_word(&["BAS"]) {
+        if line[0].is_word("BAS") {
             self.call(line, place, state);
         } else if let Some(name) = self.called(line) {
             let why = format!("is set by {name}, a routine of another file ({place})");
@@ -241,8 +231,8 @@ impl SystemData {
                 state.force.load = Setting::or_open(mass, by, unknown);
             }
             "$IPO_MODE" => {
-                let carried = value.get(1).is_some_and(|word| word.is_word(&["BASE"]));
-                let point = self.point_in(value, &["SIPO_MODE"]);
+                let carried = value.get(1).is_some_and(|word| word.is_word("BASE"));
+                let point = self.point_in(value, "SIPO_MODE");
                 let carried = carried || point.is_some_and(|point| !point.fixed_tool);
                 state.not_in_base =
                     Setting::Known(if carried { String::new() } else { open(FIXED) }, by);
@@ -335,7 +325,7 @@ impl SystemData {
     }
 
     /// The data of the point in `NAME(FP1)` or `NAME(FP1.MEMBER)`.
-    fn point_in(&self, value: &[Token], names: &[&str]) -> Option<PointData> {
+    fn point_in(&self, value: &[Token], names: &str) -> Option<PointData> {
         let [name, open, point, ..] = value else {
             return None;
         };
@@ -370,7 +360,7 @@ impl SystemData {
 
     fn base(&self, value: &[Token]) -> Option<Pose> {
         let entry = || self.base_of(indexed(value, "BASE_DATA")?);
-        let of_point = || self.base_of(self.point_in(value, &["SBASE"])?.base);
+        let of_point = || self.base_of(self.point_in(value, "SBASE")?.base);
         self.plain(value).or_else(entry).or_else(of_point)
     }
 
@@ -379,7 +369,7 @@ impl SystemData {
             let (name, frame) = ("$TOOL".into(), Some(frame));
             return Some(ToolInForce { name, frame });
         }
-        let of_point = || Some(self.point_in(value, &["STOOL", "STOOL2"])?.tool);
+        let of_point = || Some(self.point_in(value, "STOOL STOOL2")?.tool);
         let number = indexed(value, "TOOL_DATA").or_else(of_point);
         number.map(|number| self.tool_of(number))
     }
@@ -389,7 +379,7 @@ impl SystemData {
         if value.first().is_some_and(|first| first.is(b'{')) {
             return Some(mass(value));
         }
-        let of_point = || Some(self.point_in(value, &["SLOAD"])?.tool);
+        let of_point = || Some(self.point_in(value, "SLOAD")?.tool);
         let number = indexed(value, "LOAD_DATA").or_else(of_point);
         number.map(|number| sole(&self.loads, &number))
     }
@@ -444,14 +434,14 @@ fn indexed(value: &[Token], table: &str) -> Option<i64> {
     let [name, open, index, close] = value else {
         return None;
     };
-    let is = name.is_word(&[table]) && open.is(b'[') && close.is(b']');
+    let is = name.is_word(table) && open.is(b'[') && close.is(b']');
     let (number, _) = number(std::slice::from_ref(index)).filter(|_| is)?;
     Some(number as i64)
 }
 
 /// A frame: `{X 1, ..., C 6}` or `$NULLFRAME`, mm and deg.
 fn frame(value: &[Token]) -> Option<Pose> {
-    if value.len() == 1 && value[0].is_word(&["$NULLFRAME"]) {
+    if value.len() == 1 && value[0].is_word("$NULLFRAME") {
         return Some(Pose::identity());
     }
     let [x, y, z, a, b, c] = ["X", "Y", "Z", "A", "B", "C"].map(|name| field(value, name));
@@ -467,7 +457,7 @@ fn mass(value: &[Token]) -> Option<f64> {
 /// The data of a point.
 fn point(value: &[Token]) -> Option<PointData> {
     let number = |name: &str| field(value, name).map(|number| number as i64);
-    let fixed = |w: &[Token]| w[0].is_word(&["IPO_FRAME"]) && w[2].is_word(&["TCP"]);
+    let fixed = |w: &[Token]| w[0].is_word("IPO_FRAME") && w[2].is_word("TCP");
     Some(PointData {
         tool: number("TOOL_NO")?,
         base: number("BASE_NO")?,

@@ -132,7 +132,7 @@ impl<'t, 'p> List<'t, 'p> {
 
     /// Whether item `k` is a word, in any case.
     pub fn is_word(&self, k: usize, word: &str) -> bool {
-        matches!(self.items.get(k), Some(Item::Leaf([token])) if token.is_word(&[word]))
+        matches!(self.items.get(k), Some(Item::Leaf([token])) if token.is_word(word))
     }
 
     /// What it, or a list inside it, has the form of: names may stand for some of its lists.

@@ -42,26 +42,11 @@ const MOTIONS: [(&str, &[usize]); 10] = [
 const NO_MOTION: &str = "TRIGGCHECKIO";
 
 /// Keywords behind which a statement begins.
-const BLOCKS: [&str; 15] = [
-    "THEN",
-    "DO",
-    "ELSE",
-    "ENDIF",
-    "ENDFOR",
-    "ENDWHILE",
-    "ENDTEST",
-    "ENDPROC",
-    "ENDFUNC",
-    "ENDTRAP",
-    "ENDMODULE",
-    "ENDRECORD",
-    "BACKWARD",
-    "ERROR",
-    "UNDO",
-];
+const BLOCKS: &str = "THEN DO ELSE ENDIF ENDFOR ENDWHILE ENDTEST ENDPROC ENDFUNC ENDTRAP ENDMODULE ENDRECORD \
+    BACKWARD ERROR UNDO";
 
 /// What a declaration begins with.
-const STORAGE: [&str; 3] = ["VAR", "PERS", "CONST"];
+const STORAGE: &str = "VAR PERS CONST";
 
 /// Types whose literals may have the form of a target and are none.
 const NUMBERS: [&str; 5] = ["NUM", "DNUM", "BYTE", "ROBJOINT", "EXTJOINT"];
@@ -95,12 +80,12 @@ fn statements<'t, 'p>(tokens: &'t [Token<'p>], found: &mut Gathered) -> Vec<&'t 
         let token = &tokens[k];
         let end = if token.is(b';') {
             Some((k, k + 1))
-        } else if token.is(b':') || token.is_word(&BLOCKS) {
+        } else if token.is(b':') || token.is_word(BLOCKS) {
             Some((k + 1, k + 1))
         } else {
             heading(&tokens[k..]).map(|length| (k + length, k + length))
         };
-        let ends = token.is(b';') || token.is(b':') || token.is_word(&["THEN", "DO"]);
+        let ends = token.is(b';') || token.is(b':') || token.is_word("THEN DO");
         let mut before = tokens[start..k].iter();
         if end.is_some() && !ends && before.any(|one| one.is(b'[') || one.assigns()) {
             let message = format!("`;` is missing before {}", token.quoted());
@@ -120,9 +105,9 @@ fn statements<'t, 'p>(tokens: &'t [Token<'p>], found: &mut Gathered) -> Vec<&'t 
 /// How many tokens the head of a module or a routine has; none where there is no such head.
 fn heading(tokens: &[Token]) -> Option<usize> {
     let kind = &tokens[0];
-    let mut length = if kind.is_word(&["MODULE", "PROC", "TRAP"]) {
+    let mut length = if kind.is_word("MODULE PROC TRAP") {
         2
-    } else if kind.is_word(&["FUNC"]) {
+    } else if kind.is_word("FUNC") {
         3
     } else {
         return None;
@@ -144,12 +129,12 @@ struct Declaration<'t, 'p> {
 }
 
 fn declaration<'t, 'p>(statement: &'t [Token<'p>]) -> Option<Declaration<'t, 'p>> {
-    let is_scope = |token: &&Token| token.is_word(&["LOCAL", "TASK"]);
+    let is_scope = |token: &&Token| token.is_word("LOCAL TASK");
     let scoped = statement.iter().take_while(is_scope).count();
     let [storage, kind, name, tail @ ..] = &statement[scoped..] else {
         return None;
     };
-    if !storage.is_word(&STORAGE) || [kind, name].iter().any(|one| one.sort != TokenKind::Word) {
+    if !storage.is_word(STORAGE) || [kind, name].iter().any(|one| one.sort != TokenKind::Word) {
         return None;
     }
     let assign = tail.iter().position(Token::assigns);
@@ -193,7 +178,7 @@ impl Reader {
             depths(statement).position(|(token, depth)| depth == 0 && wanted(token))
         };
         // In the head of a routine these words stand in brackets.
-        if let Some(storage) = outside(|token| token.is_word(&STORAGE)) {
+        if let Some(storage) = outside(|token| token.is_word(STORAGE)) {
             let message = "a declaration that is not understood; expected a type and a name";
             return self.0.fault(statement[storage].start, message);
         }
@@ -208,7 +193,7 @@ impl Reader {
         const BASE: &str =
             "calib assumed that targets are in the robot's base, as in wobj0 without displacement";
         let head = &statement[0];
-        if head.is_word(&["PDISPON", "PDISPSET", "EOFFSON", "EOFFSSET"]) {
+        if head.is_word("PDISPON PDISPSET EOFFSON EOFFSSET") {
             let message = format!("{} displaces what follows: {BASE}", head.quoted());
             self.0.frame(head.start, message);
         }
@@ -346,7 +331,7 @@ impl Reader {
         };
         let does = if !bracket.is(b'(') {
             return;
-        } else if function.is_word(&["OFFS", "RELTOOL"]) {
+        } else if function.is_word("OFFS RELTOOL") {
             "shifts its target; where that one is corrected, the shifted one gets the same correction"
         } else if target {
             "computes the target"

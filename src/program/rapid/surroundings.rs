@@ -45,7 +45,7 @@ impl DeclaredSurroundings {
                     let value = declared.value.unwrap_or_default();
                     self.declare(&declared.kind, declared.name, value)
                 }
-                None if statement[0].is_word(&["GRIPLOAD"]) => self.grip(statement),
+                None if statement[0].is_word("GRIPLOAD") => self.grip(statement),
                 None => {}
             }
         }
@@ -82,7 +82,7 @@ impl DeclaredSurroundings {
         }
         let name = first.upper();
         let mut pairs = statement.windows(2);
-        let of_load = pairs.any(|w| w[0].is(b'.') && w[1].is_word(&["TLOAD"]));
+        let of_load = pairs.any(|w| w[0].is(b'.') && w[1].is_word("TLOAD"));
         if let Some(pose) = self.objects.get_mut(&name) {
             *pose = Err(SET.into());
         }
@@ -97,7 +97,7 @@ impl DeclaredSurroundings {
     /// `GripLoad`: from there on another load is carried, and where that is the order of execution alone says.
     fn grip(&mut self, statement: &[Token]) {
         let load = statement.get(1);
-        if load.is_none_or(|load| !load.is_word(&["LOAD0"])) {
+        if load.is_none_or(|load| !load.is_word("LOAD0")) {
             let why = || format!("changes when the program runs: {}", quoted(statement));
             self.gripped.get_or_insert_with(why);
         }
@@ -136,7 +136,7 @@ impl DeclaredSurroundings {
                     let span = over(argument, first.start);
                     out.placed.extend(is_own.then(|| (span, force.clone())));
                 }
-                [first, _, shifted, ..] if first.is_word(&["OFFS", "RELTOOL"]) => {
+                [first, _, shifted, ..] if first.is_word("OFFS RELTOOL") => {
                     out.moved_to(shifted, &force)
                 }
                 [first, ..] => out.moved_to(first, &force),
@@ -165,15 +165,15 @@ impl DeclaredSurroundings {
         }
         for tokens in arguments.iter().flat_map(|argument| argument.windows(4)) {
             let slot = match &tokens[1] {
-                word if word.is_word(&["WOBJ"]) => &mut object,
-                word if word.is_word(&["TLOAD"]) => &mut load,
+                word if word.is_word("WOBJ") => &mut object,
+                word if word.is_word("TLOAD") => &mut load,
                 _ => continue,
             };
             if tokens[0].is(b'\\') && tokens[2].assigns() {
-                *slot = Some(&tokens[3]).filter(|token| !token.is_word(&["LOAD0"]));
+                *slot = Some(&tokens[3]).filter(|token| !token.is_word("LOAD0"));
             }
         }
-        let base = match object.filter(|object| !object.is_word(&["WOBJ0"])) {
+        let base = match object.filter(|object| !object.is_word("WOBJ0")) {
             None => Setting::Known(Pose::identity(), "wobj0".into()),
             Some(object) => match self.objects.get(&object.upper()) {
                 Some(Ok(pose)) => Setting::Known(*pose, format!("work object {}", object.quoted())),

@@ -10,6 +10,7 @@ use crate::ingest::mapped::{
 use crate::observation::{ColumnShape, Convention, Conventions, DeclaredColumn};
 use crate::raw::DecimalMark;
 use crate::table::recording_columns;
+use calib_foundation::named;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
 use serde::{Deserialize, Serialize, Serializer};
@@ -411,25 +412,17 @@ fn is_false(value: &bool) -> bool {
     !value
 }
 
-/// An axis of the tracker's frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Axis {
-    /// Along x.
-    X,
-    /// Along y.
-    Y,
-    /// Along z.
-    Z,
-}
-
-impl Axis {
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::X => "x",
-            Self::Y => "y",
-            Self::Z => "z",
-        }
+named! {
+    /// An axis of the tracker's frame.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Axis {
+        /// Along x.
+        X "x",
+        /// Along y.
+        Y "y",
+        /// Along z.
+        Z "z",
     }
 }
 

@@ -5,45 +5,27 @@ use crate::raw::RecordFault;
 use crate::table::{Rejected, RejectedRow, Table};
 use crate::units::Unit;
 use crate::{Context, Sink, StreamedTable};
+use calib_foundation::named;
 use std::collections::BTreeMap;
 
-/// Why a row is not used; the stable word in the table `rejected`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Reason {
-    Blank,
-    NotANumber,
-    NotText,
-    ShortRow,
-    LongRow,
-    LostBeam,
-    OutOfRange,
-    OutOfOrder,
-    DuplicateId,
-    DuplicateRow,
-    DoubledStamp,
-    Foreign,
-    Damaged,
-    Unmatched,
-}
-
-impl Reason {
-    pub(super) fn word(self) -> &'static str {
-        match self {
-            Self::Blank => "blank",
-            Self::NotANumber => "not_a_number",
-            Self::NotText => "not_text",
-            Self::ShortRow => "short_row",
-            Self::LongRow => "long_row",
-            Self::LostBeam => "lost_beam",
-            Self::OutOfRange => "out_of_range",
-            Self::OutOfOrder => "out_of_order",
-            Self::DuplicateId => "duplicate_id",
-            Self::DuplicateRow => "duplicate_row",
-            Self::DoubledStamp => "doubled_stamp",
-            Self::Foreign => "foreign",
-            Self::Damaged => "damaged",
-            Self::Unmatched => "unmatched",
-        }
+named! {
+    /// Why a row is not used; the stable word in the table `rejected`.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    pub(super) enum Reason {
+        Blank "blank",
+        NotANumber "not_a_number",
+        NotText "not_text",
+        ShortRow "short_row",
+        LongRow "long_row",
+        LostBeam "lost_beam",
+        OutOfRange "out_of_range",
+        OutOfOrder "out_of_order",
+        DuplicateId "duplicate_id",
+        DuplicateRow "duplicate_row",
+        DoubledStamp "doubled_stamp",
+        Foreign "foreign",
+        Damaged "damaged",
+        Unmatched "unmatched",
     }
 }
 
@@ -81,7 +63,7 @@ impl RowRefusal {
             file: file.into(),
             line: line as i64,
             point_id: (!id.is_empty()).then(|| id.into()),
-            reason: self.reason.word().into(),
+            reason: self.reason.name().into(),
             detail: self.detail,
             text: begin.into(),
         }

@@ -169,7 +169,7 @@ fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
             0 => String::new(),
             line => format!("line {line}: "),
         };
-        let (rows, word) = (count.rows, reason.word());
+        let (rows, word) = (count.rows, reason.name());
         format!("{rows} {word} ({place}{})", count.first_detail)
     });
     let listed: Vec<String> = listed.collect();

@@ -1,6 +1,6 @@
 //! A case of a seed: which arm, which inertials within their tolerance, which effects in which sizes, along which commands.
 
-use super::law::Law;
+use super::law::{DRAWS, Law};
 use super::motion;
 use super::rig::{Rig, Servo};
 use crate::conceal::design::Design;
@@ -41,8 +41,8 @@ const LASTS: [f64; 3] = [8.0, 7.0, 6.0];
 /// s of rest at either end of a trajectory, and in which it comes up.
 const REST: f64 = 0.6;
 const RAMP: f64 = 0.8;
-/// Laws of [`law`].
-const LAWS: usize = 26;
+/// Laws that are listed: all but the last.
+const LAWS: usize = DRAWS.len() - 1;
 
 /// What arms of a kind have: rows are joints.
 struct Plan {
@@ -304,114 +304,17 @@ impl DriveCase {
 
     /// A law by its number, of a size that drives have.
     fn law(&self, which: usize, draw: &mut Noise) -> Law {
-        let n = self.stated.joints();
-        let j = draw.index(n);
-        let usual = self.usual(j);
-        let servo = &self.stated.servos[j];
-        let either = |draw: &mut Noise, low: f64, high: f64| match draw.chance(0.5) {
-            true => draw.uniform(low, high),
-            false => 1.0 / draw.uniform(low, high),
+        let joint = draw.index(self.stated.joints());
+        let site = Site {
+            case: self,
+            joint,
+            usual: self.usual(joint),
+            servo: &self.stated.servos[joint],
         };
-        match which {
-            0 => Law::Delay(draw.chance(0.5).then_some(j), draw.uniform(0.005, 0.02)),
-            1 => Law::Offset(j, draw.sign() * draw.uniform(0.005, 0.02)),
-            2 => Law::Gain(j, either(draw, 1.2, 1.8)),
-            3 => Law::Damping(j, either(draw, 1.3, 2.2)),
-            4 => Law::Rotor(j, either(draw, 1.5, 2.5)),
-            5 => Law::Limit(j, usual.torque * draw.uniform(0.5, 0.8)),
-            6 => Law::DeadBand(j, usual.error * draw.uniform(0.1, 0.3)),
-            7 => Law::SpeedLimit(j, usual.rate * draw.uniform(0.4, 0.75)),
-            8 => Law::Integral(
-                j,
-                [
-                    servo.kp * draw.uniform(0.4, 2.0),
-                    usual.torque * draw.uniform(0.2, 0.5),
-                ],
-            ),
-            9 => Law::Viscous(j, usual.torque / usual.speed * draw.uniform(0.1, 0.3)),
-            10 => Law::Coulomb(j, usual.torque * draw.uniform(0.1, 0.3)),
-            11 => Law::Stribeck(
-                j,
-                [
-                    usual.torque * draw.uniform(0.1, 0.3),
-                    usual.speed * draw.uniform(0.05, 0.2),
-                ],
-            ),
-            12 => {
-                let mu = draw.uniform(0.1, 0.35);
-                Law::Load(
-                    j,
-                    if draw.chance(0.5) {
-                        [mu, mu]
-                    } else {
-                        [0.0, 1.5 * mu]
-                    },
-                )
-            }
-            // From a few grams of grease to a gear that the whole recording does not warm: what looks so may assume less.
-            13 => Law::WarmUp(
-                j,
-                [draw.uniform(0.6, 1.5), 6.0 * draw.uniform(0.0, 3.0).exp()],
-            ),
-            14 => Law::Cable(
-                j,
-                [servo.kp * draw.uniform(0.05, 0.15), draw.uniform(-0.3, 0.3)],
-            ),
-            15 => Law::Ripple(
-                j,
-                [
-                    usual.torque * draw.uniform(0.1, 0.25),
-                    (2 + draw.index(12)) as f64,
-                    draw.uniform(0.0, TAU),
-                ],
-            ),
-            16 => {
-                let by = (j + 1 + draw.index(n - 1)) % n;
-                let share = (usual.torque / self.usual(by).torque).min(1.0);
-                Law::Coupling(j, by, draw.sign() * share * draw.uniform(0.1, 0.25))
-            }
-            17 => {
-                let all: f64 = self.stated.machine.links.iter().map(|link| link.mass).sum();
-                Law::Payload(all * draw.uniform(0.04, 0.12))
-            }
-            18 => Law::Centre(1 + draw.index(n - 1), draw.vector(0.015, 0.03)),
-            19 => {
-                let [x, y, _] = draw.vector(0.05, 0.1);
-                Law::Gravity([x, y])
-            }
-            20 => {
-                let k = servo.kp * draw.uniform(6.0, 30.0);
-                let damping = draw.uniform(0.05, 0.2) * (k * servo.armature).sqrt();
-                Law::Elasticity(j, [k, damping])
-            }
-            21 => {
-                let k = servo.kp * draw.uniform(30.0, 60.0);
-                let damping = draw.uniform(0.1, 0.3) * (k * servo.armature).sqrt();
-                Law::Backlash(j, [draw.uniform(0.004, 0.02), k, damping])
-            }
-            22 => Law::Presliding(j, draw.uniform(0.002, 0.01)),
-            23 => Law::GearLoad(j, [draw.uniform(0.0, 0.2), draw.uniform(0.3, 0.9)]),
-            24 => Law::Hold(self.period * (2 + draw.index(4)) as f64),
-            25 => {
-                let all: f64 = (0..n).map(|joint| self.usual(joint).torque).sum();
-                Law::Sag(draw.uniform(0.15, 0.4) / all)
-            }
-            _ => {
-                let width = 0.25 * (usual.range[1] - usual.range[0]) * draw.uniform(0.4, 0.8);
-                let [low, high] = usual.range;
-                Law::Bump(
-                    j,
-                    [
-                        draw.sign() * usual.torque * draw.uniform(0.2, 0.4),
-                        draw.uniform(low + width, high - width),
-                        width,
-                    ],
-                )
-            }
-        }
+        DRAWS[which](&site, draw)
     }
 
-    fn usual(&self, joint: usize) -> Usual {
+    pub(super) fn usual(&self, joint: usize) -> Usual {
         let n = self.stated.joints();
         let angles = motion::angles(&self.stated, &self.commands, self.period, motion::COARSE);
         let servo = &self.stated.servos[joint];
@@ -438,10 +341,18 @@ impl DriveCase {
 
 /// Largest values of the arm as it is believed to be.
 #[derive(Default)]
-struct Usual {
-    torque: f64,
-    error: f64,
-    speed: f64,
-    rate: f64,
-    range: [f64; 2],
+pub(super) struct Usual {
+    pub(super) torque: f64,
+    pub(super) error: f64,
+    pub(super) speed: f64,
+    pub(super) rate: f64,
+    pub(super) range: [f64; 2],
+}
+
+/// A joint that a law is drawn for.
+pub(super) struct Site<'a> {
+    pub(super) case: &'a DriveCase,
+    pub(super) joint: usize,
+    pub(super) usual: Usual,
+    pub(super) servo: &'a Servo,
 }
