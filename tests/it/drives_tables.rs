@@ -273,7 +273,8 @@ fn the_folder_of_a_lerobot_data_set_becomes_a_pipeline_of_its_episodes() {
         let (error, _) = before(&diagnosed);
         rms.push(error);
     }
-    assert!((rms[0] / rms[1] - 1.0).abs() < 1e-6, "{rms:?}");
+    // But for the steps, which each search halves where it finds what they err by.
+    assert!((rms[0] / rms[1] - 1.0).abs() < 1e-3, "{rms:?}");
     let turned = data_set(&folder, three, &json!(["gripper.pos", "j1.pos"]), |x| x);
     let refused = calib(turned.path(), "init arm --data . --mjcf robot.xml");
     assert!(

@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// rad rms of a unit of amplitude: the amplitudes of the table of causes are those of metres at a tool.
 const UNIT: f64 = 10.0;
-/// Standard deviations of what noise alone makes of a joint's squared residual, above which causes with a memory are evaluated there.
+/// Standard deviations of what noise alone makes of a joint's squared residual, above which causes with a memory may join there.
 const ABOVE_NOISE: f64 = 2.0;
 /// Share of the drive's error, rms, that is left at a joint whose gain may be far off.
 const FAR_OFF: f64 = 0.5;
@@ -97,10 +97,15 @@ impl Drives {
                 [member] if key.is_gear() && key != fit.set[member].cell.key => Some(member),
                 _ => return None,
             };
+            // What explains a joint, or the arm, may be another cause there though no more than noise is left.
+            let may_replace = || fit.set.iter().any(|one| one.cell.place == cell.place);
             let seen = match key {
-                Key::Hold | Key::Sag => any,
-                Key::Integral(j) | Key::SpeedLimit(j) | Key::Presliding(j) => above(j),
-                Key::Backlash(j, _) | Key::Elasticity(j) => above(j) || instead.is_some(),
+                Key::Hold | Key::Sag => any || may_replace(),
+                Key::Integral(j)
+                | Key::SpeedLimit(j)
+                | Key::Presliding(j)
+                | Key::Backlash(j, _)
+                | Key::Elasticity(j) => above(j) || may_replace(),
                 _ => true,
             };
             if let Key::Gain(from, to) = key
@@ -408,4 +413,46 @@ fn begun(shape: &calib_engine::Shape, log: f64, size: &[f64]) -> (f64, Vec<f64>)
         *number = number.clamp(at - wide, at + wide).clamp(low, high);
     }
     (log, numbers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::against_mujoco::motion;
+    use calib_dynamics::InertialTolerance;
+    use calib_engine::{Accepted, Problem};
+
+    #[test]
+    fn what_explains_a_joint_to_the_noise_may_still_be_a_cause_with_a_memory() {
+        let (chain, base, mut recording) = motion();
+        let tolerance = InertialTolerance {
+            mass_relative: 0.02,
+            centre: 1e-3,
+            inertia_relative: 0.02,
+        };
+        let drives = Drives::new(chain, base.clone(), recording.clone(), tolerance);
+        let all = cells(&base, &drives.usual, recording.period, drives.shown);
+        let accepted = |key: Key| {
+            let cell = all.iter().find(|cell| cell.key == key).unwrap();
+            Accepted {
+                numbers: cell.shapes[0].start.clone(),
+                cell: cell.clone(),
+                shape: 0,
+            }
+        };
+        let slews = accepted(Key::SpeedLimit(1));
+        recording.angle = drives.angles(&drives.physics(&[], &[slews]), Which::All);
+        let measured = Drives::new(drives.chain.clone(), base, recording, tolerance);
+        let friction = accepted(Key::Viscous(1));
+        let mut fit = measured.fit(&[friction], None, f64::NEG_INFINITY);
+        // As large a model error as that leaves nothing out of noise.
+        fit.doubt.fill(1e4);
+        let around = measured.around(&fit, None);
+        let is_seen = |out: Option<usize>, joint: usize| {
+            let is_it = |one: &Scanned<Key>| one.accepted.cell.key == Key::SpeedLimit(joint);
+            measured.scan(&fit, &around, out).iter().any(is_it)
+        };
+        assert!(is_seen(Some(0), 1));
+        assert!(!is_seen(Some(0), 2));
+    }
 }

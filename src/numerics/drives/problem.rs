@@ -132,6 +132,11 @@ impl Drives {
                 .key
                 .apply(&accepted.numbers, &self.usual, self.duration, &mut physics);
         }
+        for joint in &mut physics.joints {
+            // No drive takes a command before it is sent, no joint speeds up by itself.
+            joint.delay = joint.delay.max(0.0);
+            joint.damping = joint.damping.max(-joint.kd);
+        }
         physics
     }
 
@@ -352,5 +357,44 @@ impl Problem for Drives {
 
     fn excludes(&self, one: &Accepted<Key>, other: &Accepted<Key>) -> bool {
         one.cell.key.excludes(other.cell.key)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::against_mujoco::motion;
+    use crate::causes::cells;
+
+    #[test]
+    fn no_command_is_taken_before_it_is_sent_and_no_joint_speeds_up_by_itself() {
+        let (chain, mut base, mut recording) = motion();
+        base.joints.iter_mut().for_each(|joint| joint.delay = 4e-3);
+        let tolerance = InertialTolerance {
+            mass_relative: 0.02,
+            centre: 1e-3,
+            inertia_relative: 0.02,
+        };
+        let drives = Drives::new(chain, base.clone(), recording.clone(), tolerance);
+        let all = cells(&base, &drives.usual, recording.period, drives.shown);
+        let member = |key: Key, number: f64| Accepted {
+            cell: all.iter().find(|cell| cell.key == key).unwrap().clone(),
+            shape: 0,
+            numbers: vec![number],
+        };
+        let mut early = base.clone();
+        early
+            .joints
+            .iter_mut()
+            .for_each(|joint| joint.delay = -8e-3);
+        recording.angle = drives.angles(&early, Which::All);
+        let measured = Drives::new(drives.chain.clone(), base.clone(), recording, tolerance);
+        let fit = measured.fit(&[member(Key::Delay(None), 0.0)], None, f64::NEG_INFINITY);
+        let found = measured.physics(&fit.inertia, &fit.set);
+        assert!(found.joints.iter().all(|joint| joint.delay < 1e-3));
+        assert!(found.joints.iter().all(|joint| joint.delay >= 0.0));
+        let joint = &base.joints[1];
+        let pushes = member(Key::Viscous(1), -2.0 * (joint.damping + joint.kd));
+        assert_eq!(drives.physics(&[], &[pushes]).joints[1].damping, -joint.kd);
     }
 }
