@@ -286,6 +286,51 @@ pub(super) fn faint(choice: &CauseChoice, set: &[usize], silent: &[usize]) -> Ve
     let pays = |place: &usize| table.odds_of(&clear, *place, kappa) > options().leaves;
     let clear = (0..clear.len()).filter(pays).map(|place| clear[place].form);
     let clear: Vec<usize> = clear.collect();
-    let is_faint = |number: &usize| !clear.contains(number) && !silent.contains(number);
+    // When others go, a form may take another shape.
+    let is_one = |a: usize, b: usize| {
+        table.cell_of[&a] == table.cell_of[&b] && choice.form(a).with == choice.form(b).with
+    };
+    let is_clear = |number: usize| clear.iter().any(|one| is_one(*one, number));
+    let is_faint = |number: &usize| !is_clear(*number) && !silent.contains(number);
     set.iter().copied().filter(is_faint).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cases::{Row, arm, record, sign};
+    use super::super::problem::{TorqueBand, TorqueProblem, basic_forms, noise_of, rich_forms};
+    use super::super::recording::RecordingClock;
+    use super::super::refine::take_sign_widths;
+    use super::super::types::TorqueQuestion;
+    use super::super::weighted::NoiseMemory;
+    use super::*;
+    use crate::effect::Place;
+
+    #[test]
+    fn a_form_of_a_refined_shape_is_clear_though_others_are_faint() {
+        let arm = arm();
+        let friction = |(joint, _, _, velocity, ..): Row| {
+            let falls = 4.0 * libm::exp(-velocity.abs() / 0.1);
+            sign(velocity) * (5.0 + if joint == 2 { falls } else { 0.0 })
+        };
+        let recording = record(&arm, 0.0, &friction);
+        let clock = RecordingClock::of(&recording);
+        let (question, band) = (TorqueQuestion::default(), TorqueBand::whole(10.0));
+        let mut problem = TorqueProblem::new(&arm, recording, &question, &clock, band);
+        take_sign_widths(&mut problem, false);
+        problem.form();
+        let rich = rich_forms(&problem, &[]);
+        problem.noise = noise_of(&problem, &rich, NoiseMemory::Short);
+        let mut set = basic_forms(&problem);
+        let mut forms = problem.all.forms.iter();
+        let stribeck = forms.find(|form| form.is_called("stribeck_friction", Place::Joint(2)));
+        let refined = stribeck.expect("listed").with_shape(0, 0.115);
+        let refined = problem.push(refined);
+        set.push(refined);
+        let weighted = problem.weighted(&set);
+        let faint = faint(&CauseChoice::new(&problem, &weighted), &set, &[]);
+        // There is no viscous friction, and with that the shape that is listed is the better one.
+        assert!(!faint.is_empty());
+        assert!(!faint.contains(&refined));
+    }
 }
