@@ -104,7 +104,7 @@ pub(super) fn must_be_a_prior(open_world: f64, at: &mut Place) {
 }
 
 crate::stage! {
-    Diagnose, "diagnose", 56, "locates where simulation and recording differ, and names the physics that the model leaves out",
+    Diagnose, "diagnose", 57, "locates where simulation and recording differ, and names the physics that the model leaves out",
         DiagnoseReads {
             robot: Robot,
             recording: Recording,

@@ -378,20 +378,24 @@ fn hidden_friction(fit: &FittedSet, number: usize) -> Option<String> {
     };
     let most = *NAMED * sigma;
     let (_, unit) = form.coefficient_names().swap_remove(0);
-    let most_of_it = match unit {
-        "1" => format!("{} % of the load", significant(1e2 * most, 2)),
-        unit => {
-            let unit = unit_at(form.slides(&problem.scene.arm.prismatic), unit);
-            format!("{} {unit}", significant(most, 2))
-        }
-    };
+    let unit = unit_at(form.slides(&problem.scene.arm.prismatic), unit);
+    let most_of_it = most_of(most, unit);
     (most > 0.0 && most * size > HIDDEN * torque).then(|| {
         format!(
-            "{} {}: not seen; up to {most_of_it} would be hidden by the noise",
+            "{} {}: not seen; {most_of_it} would be hidden by the noise",
             form.place,
             form.name().replace('_', " ")
         )
     })
+}
+
+/// At most so much of a unit, or of the load.
+fn most_of(most: f64, unit: &str) -> String {
+    match unit {
+        "1" if most >= 1.0 => "any share of the load".to_string(),
+        "1" => format!("up to {} % of the load", significant(1e2 * most, 2)),
+        unit => format!("up to {} {unit}", significant(most, 2)),
+    }
 }
 
 /// Speeds below and above which a tenth of the moving rows are.
@@ -413,4 +417,16 @@ fn is_unseen(fit: &FittedSet, number: usize) -> bool {
     let torque = largest(measured.flatten());
     let sigma = fit.sweep.with(&[number]).sigma(place);
     sigma == 0.0 || sigma * size > UNSEEN * torque
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_share_of_the_load_that_may_be_all_of_it_is_any() {
+        assert_eq!(most_of(9.22, "1"), "any share of the load");
+        assert_eq!(most_of(0.123, "1"), "up to 12 % of the load");
+        assert_eq!(most_of(0.123, "Nm"), "up to 0.12 Nm");
+    }
 }

@@ -67,7 +67,7 @@ pub(crate) struct Answer {
 
 impl CauseTable<'_, '_> {
     /// The name of a component.
-    fn name_of(&self, component: &Component) -> Cow<'static, str> {
+    pub(super) fn name_of(&self, component: &Component) -> Cow<'static, str> {
         let cell = &self.cells[component.cell];
         let is_table = |form: &Form| form.term().is_some_and(Term::is_own_table);
         if cell.name == names::JOINT_COMPLIANCE && component.shape.is_bent {

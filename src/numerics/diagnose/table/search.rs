@@ -390,7 +390,7 @@ impl CauseTable<'_, '_> {
 
     /// Components with a name.
     pub(super) fn named(&self, components: &[Component]) -> Vec<Component> {
-        let is_named = |component: &&Component| self.cells[component.cell].is_named();
+        let is_named = |component: &&Component| self.name_of(component) != names::UNKNOWN;
         components.iter().filter(is_named).cloned().collect()
     }
 
