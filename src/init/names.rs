@@ -35,12 +35,16 @@ impl Name {
         self.unit.filter(|unit| allowed.contains(unit))
     }
 
-    /// Whether the name is one of these, or one of them begins or ends it as a word of its own.
+    /// Whether the name is one of these, or one of them begins or ends it as a word of its own; that it is a mean says nothing of what it is.
     pub(crate) fn is(&self, list: &str) -> bool {
+        let words = match self.words.split_last() {
+            Some((last, words)) if !words.is_empty() && lists(MEANS, last) => words,
+            _ => &self.words,
+        };
         // A letter alone says little beside other words: `x_t` is no time.
         let is_end =
             |word: Option<&String>| word.is_some_and(|word| word.len() > 1 && lists(list, word));
-        lists(list, &self.stem()) || is_end(self.words.first()) || is_end(self.words.last())
+        lists(list, &self.stem()) || is_end(words.first()) || is_end(words.last())
     }
 
     /// What the joints are called here, `#` for the number, and which one this is: `q1`, `A1_deg`, `joint_3`, `wrist 4 act [deg]`.
@@ -287,8 +291,8 @@ pub(super) const IDS: &str = "point point_id pointid point_name pointname id nam
     nombre nome punto point_no row sample messung repere repère n";
 pub(super) const PAYLOADS: &str = "payload payload_mass load mass weight last traglast nutzlast zuladung gewicht masse lastmasse charge \
     charge_utile poids carga carga_util carga_útil peso masa carico load_mass tool_load";
-pub(super) const TEMPERATURES: &str =
-    "temp temperature temperatur température temperatura temps_c raumtemperatur";
+pub(super) const TEMPERATURES: &str = "temp temperature temperatures temperatur temperaturen température temperatura temps_c raumtemperatur";
+const MEANS: &str = "mean avg average mittel mittelwert moyenne media";
 pub(super) const TIMES: &str = "time t timestamp stamp zeit zeitstempel messzeit uhrzeit temps horodatage heure tiempo hora tempo \
     clock";
 pub(super) const USAGES: &str = "use usage set verwendung split";
@@ -301,6 +305,13 @@ mod tests {
 
     fn names(texts: &[&str]) -> Vec<Name> {
         texts.iter().map(|text| Name::of(text)).collect()
+    }
+
+    #[test]
+    fn the_mean_of_temperatures_is_a_temperature() {
+        assert!(Name::of("joint_temperatures_mean").is(TEMPERATURES));
+        assert!(Name::of("Motortemperaturen Mittelwert [C]").is("motortemperaturen"));
+        assert!(!Name::of("mean").is(TEMPERATURES));
     }
 
     #[test]

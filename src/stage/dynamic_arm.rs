@@ -38,17 +38,24 @@ pub fn dynamic_arm(robot: &RobotDescription) -> Result<(DynamicArm, Vec<String>)
         let moments = robot.inertias.links.get(index).copied().flatten();
         match (joint.mass, joint.centre, moments) {
             (Some(mass), Some(centre), Some(moments)) => Ok(inertial(mass, centre, &moments)),
-            _ => Err(index),
+            (mass, centre, moments) => {
+                let lacks = [
+                    mass.is_none().then_some("no mass"),
+                    centre.is_none().then_some("no centre of mass"),
+                    moments.is_none().then_some("no moments of inertia"),
+                ];
+                let lacks: Vec<&str> = lacks.into_iter().flatten().collect();
+                Err(format!("link {} has {}", index + 1, lacks.join(", ")))
+            }
         }
     };
     let joints = || robot.joints.iter();
-    let all: Result<Vec<_>, usize> = joints().enumerate().map(declared).collect();
+    let all: Result<Vec<_>, String> = joints().enumerate().map(declared).collect();
     let links = match all {
         Ok(links) => Some(links),
-        Err(link) => {
+        Err(lacks) => {
             notes.push(format!(
-                "link {} has no mass, centre or inertia in the robot file: masses are identified, their errors cannot be findings",
-                link + 1
+                "{lacks} in the robot file: masses are identified, and a wrong one, of a payload too, cannot be a finding"
             ));
             None
         }
@@ -132,7 +139,8 @@ pub fn torque_per_ampere(robot: &RobotDescription) -> Result<Vec<f64>> {
         return Ok(all.into_iter().flatten().collect());
     }
     let message = format!(
-        "the recording holds motor currents, and joint {} has no reduction ratio or no motor constant (Nm/A) in the robot file",
+        "the recording holds motor currents, and joint {} has no reduction ratio or no motor constant (Nm/A) in the robot file: \
+         state both at each joint, e.g. `reduction_ratio: 100` and `motor_constant: 0.12`",
         missing.join(", ")
     );
     Err(Error::data("table robot", message))
