@@ -5,6 +5,7 @@ use crate::mjcf::{MjcfArm, MjcfText, read};
 use crate::physics::{Joint, Physics};
 use crate::recording::{Recording, Trajectory};
 use crate::rollout::{Which, roll};
+use calib_dynamics::InertialTolerance;
 use serde_json::Value;
 
 const ARM: &str = include_str!("mujoco/arm.xml");
@@ -61,6 +62,13 @@ fn mass_matrix_bias_and_kinematics_are_those_of_mujoco() {
         }
     }
 }
+
+/// One standard deviation of its inertials.
+pub(crate) const TOLERANCE: InertialTolerance = InertialTolerance {
+    mass_relative: 0.02,
+    centre: 1e-3,
+    inertia_relative: 0.02,
+};
 
 /// The arm with its drives along a motion, as MuJoCo simulates it.
 pub(crate) fn motion() -> (Chain, Physics, Recording) {

@@ -418,19 +418,13 @@ fn begun(shape: &calib_engine::Shape, log: f64, size: &[f64]) -> (f64, Vec<f64>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::against_mujoco::motion;
-    use calib_dynamics::InertialTolerance;
+    use crate::against_mujoco::{TOLERANCE, motion};
     use calib_engine::{Accepted, Problem};
 
     #[test]
     fn what_explains_a_joint_to_the_noise_may_still_be_a_cause_with_a_memory() {
         let (chain, base, mut recording) = motion();
-        let tolerance = InertialTolerance {
-            mass_relative: 0.02,
-            centre: 1e-3,
-            inertia_relative: 0.02,
-        };
-        let drives = Drives::new(chain, base.clone(), recording.clone(), tolerance);
+        let drives = Drives::new(chain, base.clone(), recording.clone(), TOLERANCE);
         let all = cells(&base, &drives.usual, recording.period, drives.shown);
         let accepted = |key: Key| {
             let cell = all.iter().find(|cell| cell.key == key).unwrap();
@@ -442,7 +436,7 @@ mod tests {
         };
         let slews = accepted(Key::SpeedLimit(1));
         recording.angle = drives.angles(&drives.physics(&[], &[slews]), Which::All);
-        let measured = Drives::new(drives.chain.clone(), base, recording, tolerance);
+        let measured = Drives::new(drives.chain.clone(), base, recording, TOLERANCE);
         let friction = accepted(Key::Viscous(1));
         let mut fit = measured.fit(&[friction], None, f64::NEG_INFINITY);
         // As large a model error as that leaves nothing out of noise.

@@ -363,19 +363,14 @@ impl Problem for Drives {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::against_mujoco::motion;
+    use crate::against_mujoco::{TOLERANCE, motion};
     use crate::causes::cells;
 
     #[test]
     fn no_command_is_taken_before_it_is_sent_and_no_joint_speeds_up_by_itself() {
         let (chain, mut base, mut recording) = motion();
         base.joints.iter_mut().for_each(|joint| joint.delay = 4e-3);
-        let tolerance = InertialTolerance {
-            mass_relative: 0.02,
-            centre: 1e-3,
-            inertia_relative: 0.02,
-        };
-        let drives = Drives::new(chain, base.clone(), recording.clone(), tolerance);
+        let drives = Drives::new(chain, base.clone(), recording.clone(), TOLERANCE);
         let all = cells(&base, &drives.usual, recording.period, drives.shown);
         let member = |key: Key, number: f64| Accepted {
             cell: all.iter().find(|cell| cell.key == key).unwrap().clone(),
@@ -388,7 +383,7 @@ mod tests {
             .iter_mut()
             .for_each(|joint| joint.delay = -8e-3);
         recording.angle = drives.angles(&early, Which::All);
-        let measured = Drives::new(drives.chain.clone(), base.clone(), recording, tolerance);
+        let measured = Drives::new(drives.chain.clone(), base.clone(), recording, TOLERANCE);
         let fit = measured.fit(&[member(Key::Delay(None), 0.0)], None, f64::NEG_INFINITY);
         let found = measured.physics(&fit.inertia, &fit.set);
         assert!(found.joints.iter().all(|joint| joint.delay < 1e-3));

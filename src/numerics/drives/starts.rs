@@ -48,16 +48,9 @@ impl Drives {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::against_mujoco::motion;
+    use crate::against_mujoco::{TOLERANCE, motion};
     use crate::causes::cells;
-    use calib_dynamics::InertialTolerance;
     use calib_engine::Problem;
-
-    const TOLERANCE: InertialTolerance = InertialTolerance {
-        mass_relative: 0.02,
-        centre: 1e-3,
-        inertia_relative: 0.02,
-    };
 
     #[test]
     fn what_inertials_take_up_beyond_their_tolerance_is_seen_as_a_cell_of_their_own() {
