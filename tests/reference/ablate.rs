@@ -109,7 +109,7 @@ fn score(case: &Case, found: &Diagnosis, is_listed: bool) -> serde_json::Value {
         .filter(|finding| !finding.forms.is_empty())
         .map(|finding| {
             (
-                finding.effect,
+                &*finding.effect,
                 finding.place.to_string(),
                 finding.probabilities.name,
             )
