@@ -40,34 +40,24 @@ criteria! {
     RATIO: f64 = 0.01, "share", "physics: teeth are counted", "";
     /// Standard deviations by which a number must be beyond.
     CLEARLY: f64 = 5.0, "standard deviations", "judgement: models that are wrong elsewhere", "";
-    /// Fewer rows than this are strays and no set-up.
-    MIXED_ROWS: usize = 10, "rows", "count: six numbers of a placement", "";
     /// A smaller share of all rows than this are strays and no set-up.
     MIXED_SHARE: f64 = 0.1, "share", "judgement: a tenth", "";
-    /// Two placements have twice the numbers of one: they must leave so many times less.
-    MIXED_BETTER: f64 = 6.0, "ratio", "judgement: twice that of one placement", "";
-    /// Rows farther off than this many medians are not where a placement has them.
-    MIXED_FAR: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
     /// Rounds of dealing.
     MIXED_ROUNDS: usize = 12, "rounds", "judgement: it settles in three", "";
-    /// Fewer rows than this do not tell one error from another: base and tool alone take nine numbers.
+    /// Fewer rows than this do not tell one error from another, base and tool alone take nine numbers; and they are strays, no set-up of their own.
     FEWEST: usize = 10, "rows", "count: nine numbers of base and tool", "";
     /// Shifts that are looked at more closely.
     SHIFTS: usize = 3, "shifts", "judgement: bounds time", "";
     /// Larger ones are not tried.
     FARTHEST: usize = 2000, "rows", "judgement: bounds time", "";
-    /// Steps longer than this many medians count as that: wrong points.
-    LONG: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
     /// Below this many rows, names sorted as text are in order.
     SORTED: usize = 11, "rows", "count: names below 10 sort alike", "";
     /// That it is what it is called: nothing else of the list explains it, or others share it alike.
     NAMED: f64 = 0.98, "probability", "count: set-up errors put in and named, tests/reference/setups.py", "";
-    /// Points farther off than this many medians are wrong by themselves.
+    /// Rows farther off than this many medians, and steps so much longer, are wrong by themselves and take no part.
     FAR: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
     /// More rows say no more of errors of this size.
     SAMPLE: usize = 240, "rows", "judgement: bounds time", "";
-    /// Rows farther off than this many medians take no part.
-    TRIM: f64 = 4.0, "medians", "literature: robust statistics, Huber (1981)", "";
     /// Arms that reach less far, or farther, are not what a robot file in the right unit describes.
     ARMS: [f64; 2] = [0.05, 50.0], "m", "physics: smallest and largest arms", "";
     /// Parts of a displacement below this share of the largest are not stated.

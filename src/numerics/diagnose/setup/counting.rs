@@ -5,7 +5,7 @@
 //! where joints are counted rightly the point in the robot's frame, R s + t by the bodies' poses and the unknown seat s, is an affine image
 //! of the measured one, which is linear in all unknowns. Rigid placements judge the best of them.
 
-use crate::criteria::setup::{CLOUD, COUNTINGS, SAME, SCREENED, TRIM};
+use crate::criteria::setup::{CLOUD, COUNTINGS, FAR, SAME, SCREENED};
 use crate::robot::RobotModel;
 use crate::setup::placement::{PointPairs, bodies, median, turning};
 use crate::spatial::Pose;
@@ -259,7 +259,7 @@ impl AffineImage<'_, '_> {
         let near: Vec<usize> = all
             .iter()
             .copied()
-            .filter(|row| off[*row] <= *TRIM * middle)
+            .filter(|row| off[*row] <= *FAR * middle)
             .collect();
         if near.len() == all.len() {
             return middle / spread;

@@ -2,7 +2,7 @@
 
 use super::placement::{Placement, place};
 use super::words::mm;
-use crate::criteria::setup::{MIXED_BETTER, MIXED_FAR, MIXED_ROUNDS, MIXED_ROWS, MIXED_SHARE};
+use crate::criteria::setup::{BETTER, FAR, FEWEST, MIXED_ROUNDS, MIXED_SHARE};
 use crate::error::counted;
 use crate::setup::placement::PointPairs;
 use crate::statistics::nearest as quantile;
@@ -27,7 +27,8 @@ impl TwoSetups {
             .into_iter()
             .filter_map(|start| dealt(pairs, start, most(&one.off)));
         let best = found.min_by(|a, b| a.left.total_cmp(&b.left))?;
-        (*MIXED_BETTER * best.left < best.before).then_some(best)
+        // Two placements have twice the numbers of one.
+        (2.0 * *BETTER * best.left < best.before).then_some(best)
     }
 
     /// All rows of a recording, of which `numbers` are those of the pairs, by the placement that has them nearest.
@@ -65,7 +66,7 @@ pub(super) fn is_in_parts(off: &[f64], limit: f64) -> bool {
 }
 
 fn fewest(rows: usize) -> usize {
-    MIXED_ROWS.max((*MIXED_SHARE * rows as f64) as usize)
+    FEWEST.max((*MIXED_SHARE * rows as f64) as usize)
 }
 
 /// Nine lengths in ten are no more than this.
@@ -81,7 +82,7 @@ fn starts(pairs: &PointPairs, one: &Placement) -> Vec<Vec<bool>> {
         .collect();
     out.push((0..rows).map(|row| row % 2 == 0).collect());
     // The rows that one placement has, and those that it leaves to another.
-    let near = one.off.iter().map(|off| *off <= *MIXED_FAR * one.left);
+    let near = one.off.iter().map(|off| *off <= *FAR * one.left);
     out.push(near.collect());
     let [missed, turned] = one.missed(pairs);
     out.extend([missed, turned].iter().map(|all| along_most(all)));

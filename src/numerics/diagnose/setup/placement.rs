@@ -1,7 +1,7 @@
 //! The nominal robot placed on measured points: its base and where each target sits on the tool, and one number of the robot file where
 //! that is asked. Gauss-Newton from Kabsch's solution, with far points trimmed.
 
-use crate::criteria::setup::{SAMPLE, TRIM};
+use crate::criteria::setup::{FAR, SAMPLE};
 use crate::estimate::align_points;
 use crate::robot::{Measurements, RobotModel, Travel};
 use crate::spatial::{Pose, hat};
@@ -149,7 +149,7 @@ impl PlacementProblem<'_, '_> {
         let mut normal = DMatrix::<f64>::zeros(width, width);
         let mut right = DVector::<f64>::zeros(width);
         let kept: Vec<usize> = (0..now.off.len())
-            .filter(|row| now.off[*row] <= *TRIM * now.left)
+            .filter(|row| now.off[*row] <= *FAR * now.left)
             .collect();
         let points = kept.iter().map(|row| self.pairs.points[*row]);
         let centre = points.sum::<Vector3<f64>>() / kept.len().max(1) as f64;

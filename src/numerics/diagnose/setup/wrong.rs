@@ -3,7 +3,7 @@
 //! Of an upright arm the axes of pitch are parallel to that of the first pitch joint, the others (swivel and roll) lie in the arm's
 //! plane: joints 1, 4 and 6 of the usual six, which are tried whatever the wrist. Then come all joints, and every two.
 
-use crate::criteria::setup::{FARTHEST, LONG, SHIFTS, SORTED};
+use crate::criteria::setup::{FAR, FARTHEST, SHIFTS, SORTED};
 use crate::robot::RobotModel;
 use crate::setup::counting::Counting;
 use crate::setup::order::ColumnOrder;
@@ -324,7 +324,7 @@ fn steps(points: &[Vector3<f64>]) -> Vec<f64> {
     let next = points.iter().cycle().skip(1);
     let lengths = points.iter().zip(next);
     let mut lengths: Vec<f64> = lengths.map(|(a, b)| (b - a).norm()).collect();
-    let limit = *LONG * median(&lengths);
+    let limit = *FAR * median(&lengths);
     lengths
         .iter_mut()
         .for_each(|length| *length = length.min(limit));
