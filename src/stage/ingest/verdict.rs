@@ -158,7 +158,8 @@ fn too_many_rejected(all: &Measurement, index: usize) -> Option<Fault> {
         };
         counts.extend((rows > 0).then_some((reason, count)));
     };
-    let of_ids = "point ids that occur more than once";
+    let of_ids =
+        "point ids that occur more than once; `duplicates: first` or `last` uses one row of each";
     count(Reason::DuplicateId, ids, first_id, of_ids);
     count(Reason::DuplicateRow, copies, first_copy, "duplicate rows");
     count(Reason::Unmatched, unmatched, 0, &without_partner);

@@ -216,7 +216,8 @@ fn too_few_usable_rows_are_an_error_with_the_reasons() {
         good(3)
     );
     let expected = "a.csv:5: 5 of 7 rows are rejected; allowed: up to 50 % (`max_rejected_fraction`); reasons: 2 blank (line 5: q1 is blank); \
-                    2 duplicate_id (line 2: point ids that occur more than once); 1 short_row (line 7: 3 fields; allowed: 6)";
+                    2 duplicate_id (line 2: point ids that occur more than once; \
+                    `duplicates: first` or `last` uses one row of each); 1 short_row (line 7: 3 fields; allowed: 6)";
     assert_eq!(refusal(&rows(&text), TWO, rr()), expected);
     take(
         &rows(&text),
