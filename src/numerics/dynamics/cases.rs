@@ -292,7 +292,10 @@ fn errors_of_friction_scatter_by_their_standard_deviations() {
     }
     let count = squares.len() as f64;
     let rms = (squares.iter().sum::<f64>() / count).sqrt();
-    assert!(count > 60.0 && (0.8..1.2).contains(&rms), "{rms} of {count}");
+    assert!(
+        count > 60.0 && (0.8..1.2).contains(&rms),
+        "{rms} of {count}"
+    );
 }
 
 #[test]
