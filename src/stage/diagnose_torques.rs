@@ -87,7 +87,7 @@ pub enum ConsistencySetting {
 const LAST: f64 = 0.3;
 
 crate::stage! {
-    DiagnoseTorques, "diagnose_torques", 27, "names the physics that the simulated torques of a moving arm lack",
+    DiagnoseTorques, "diagnose_torques", 28, "names the physics that the simulated torques of a moving arm lack",
         DiagnoseTorquesReads {
             robot: Robot,
             motion: Chunks<ArmMotion>,

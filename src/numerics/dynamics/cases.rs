@@ -266,6 +266,39 @@ fn friction_of_a_joint_is_found_within_a_hundredth() {
 }
 
 #[test]
+fn errors_of_friction_scatter_by_their_standard_deviations() {
+    const FRICTION: [(&str, &str, f64); 2] = [
+        ("viscous_friction", "viscous", 4.0),
+        ("coulomb_friction", "coulomb", 6.0),
+    ];
+    let mut squares = Vec::new();
+    for seed in 0..8 {
+        // Noise that lasts a tenth of a second beside the white one, Nm.
+        let slow = std::cell::RefCell::new((ChaCha8Rng::seed_from_u64(seed), [0.0; 4]));
+        let recording = record(&arm(), 0.0, &|(joint, _, _, velocity, ..)| {
+            let (dice, lasting) = &mut *slow.borrow_mut();
+            let fresh: f64 = (0..12).map(|_| dice.random::<f64>() - 0.5).sum();
+            lasting[joint] = 0.9 * lasting[joint] + 0.13 * fresh;
+            let braked = FRICTION[0].2 * velocity + FRICTION[1].2 * sign(velocity);
+            braked + lasting[joint]
+        });
+        let diagnosis =
+            diagnose(&bare(), &recording, &TorqueQuestion::default(), &mut |_| ()).unwrap();
+        for (effect, name, truth) in FRICTION {
+            let found = diagnosis.findings.iter().filter(|one| one.effect == effect);
+            let numbers = found.map(|one| parameter(one, name));
+            squares.extend(numbers.map(|one| ((one.value - truth) / one.sigma.unwrap()).powi(2)));
+        }
+    }
+    let count = squares.len() as f64;
+    let rms = (squares.iter().sum::<f64>() / count).sqrt();
+    assert!(
+        count > 60.0 && (0.8..1.2).contains(&rms),
+        "{rms} of {count}"
+    );
+}
+
+#[test]
 fn each_cause_of_one_joint_is_called_by_its_name() {
     fn friction(velocity: f64) -> f64 {
         4.0 * velocity + 6.0 * sign(velocity)

@@ -105,14 +105,12 @@ pub(super) fn solve<'a>(
     weighted = problem.weighted_of(&set);
     polish(&mut problem, &mut weighted, &mut set);
     let mut silent = set[named..].to_vec();
-    let rich = problem.noise.clone();
+    // Of this noise are the numbers that are stated, too.
     problem.noise = noise_left(&problem, &set);
     weighted = problem.weighted(&set);
     silent.extend(faint(&CauseChoice::new(&problem, &weighted), &set, &silent));
     let small = too_small(&mut problem, &weighted, &set, &silent);
     silent.extend(small);
-    problem.noise = rich;
-    weighted = problem.weighted(&set);
     let priors = priors(&CauseChoice::new(&problem, &weighted), &set);
     weighted.know(&priors);
     let slopes = ShapeSlopes::of(&mut problem, &mut weighted, &set);
