@@ -101,6 +101,11 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
             log_weight: 0.0,
         }
     };
+    // A change of something that is never below nothing: it takes away no more than there is.
+    let less_at_most = |there: f64, shape: Shape| Shape {
+        bounds: vec![[0.0 - there, f64::INFINITY]],
+        ..shape
+    };
     // Numbers that begin somewhere and have no small size: the whole effect is the column.
     let at = |start: &[f64], usual: &[f64]| Shape {
         start: start.to_vec(),
@@ -110,12 +115,15 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
         bounds: vec![FREE; usual.len()],
         log_weight: 0.0,
     };
+    // No drive takes a command before it is sent.
+    let delays = physics.joints.iter().map(|joint| joint.delay);
+    let least = delays.fold(f64::INFINITY, f64::min);
     add(
         Key::Delay(None),
         &DELAY,
         "arm".into(),
         2,
-        vec![line(&[2e-3], &[0.015])],
+        vec![less_at_most(least, line(&[2e-3], &[0.015]))],
     );
     add(
         Key::Hold,
@@ -214,7 +222,7 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
             &DELAY,
             vec![Shape {
                 log_weight: -0.7,
-                ..line(&[2e-3], &[0.015])
+                ..less_at_most(p.delay, line(&[2e-3], &[0.015]))
             }],
         );
         add(Key::Offset(j), &OFFSET, vec![line(&[2e-3], &[0.01])]);
@@ -252,7 +260,11 @@ pub fn cells(physics: &Physics, usual: &[Usual], period: f64, shown: f64) -> Vec
         add(
             Key::Viscous(j),
             &VISCOUS,
-            vec![line(&[0.02 * torque / speed], &[0.2 * torque / speed])],
+            // No joint speeds up by itself; where the damping of the drive is too high, friction takes it away.
+            vec![less_at_most(
+                p.damping + p.kd,
+                line(&[0.02 * torque / speed], &[0.2 * torque / speed]),
+            )],
         );
         add(
             Key::Coulomb(j),

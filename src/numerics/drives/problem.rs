@@ -132,11 +132,6 @@ impl Drives {
                 .key
                 .apply(&accepted.numbers, &self.usual, self.duration, &mut physics);
         }
-        for joint in &mut physics.joints {
-            // No drive takes a command before it is sent, no joint speeds up by itself.
-            joint.delay = joint.delay.max(0.0);
-            joint.damping = joint.damping.max(-joint.kd);
-        }
         physics
     }
 
@@ -385,11 +380,12 @@ mod tests {
         recording.angle = drives.angles(&early, Which::All);
         let measured = Drives::new(drives.chain.clone(), base.clone(), recording, TOLERANCE);
         let fit = measured.fit(&[member(Key::Delay(None), 0.0)], None, f64::NEG_INFINITY);
+        assert_eq!(fit.set[0].numbers, [-4e-3]);
         let found = measured.physics(&fit.inertia, &fit.set);
-        assert!(found.joints.iter().all(|joint| joint.delay < 1e-3));
-        assert!(found.joints.iter().all(|joint| joint.delay >= 0.0));
+        assert!(found.joints.iter().all(|joint| joint.delay == 0.0));
+        let least = |key: Key| member(key, 0.0).cell.shapes[0].bounds[0][0];
+        assert_eq!(least(Key::Delay(Some(1))), -4e-3);
         let joint = &base.joints[1];
-        let pushes = member(Key::Viscous(1), -2.0 * (joint.damping + joint.kd));
-        assert_eq!(drives.physics(&[], &[pushes]).joints[1].damping, -joint.kd);
+        assert_eq!(least(Key::Viscous(1)), -(joint.damping + joint.kd));
     }
 }
