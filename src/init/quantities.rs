@@ -191,6 +191,8 @@ impl ExaminedFile {
                 "rad",
                 Some("few joints go beyond 6.5: several turns in radians; or degrees?"),
             ),
+            // The names of UR's real-time interface (RTDE), whose angles are radians.
+            None if self.sheet.names[best[0]].starts_with("actual_q_") => ("rad", None),
             None => ("rad", Some("no value is beyond 6.5; are these degrees?")),
         };
         let why = why.map(String::from);

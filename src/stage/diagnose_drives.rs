@@ -236,7 +236,7 @@ impl ClockUnit {
 }
 
 crate::stage! {
-    DiagnoseDrives, "diagnose_drives", 12, "names the physics that the simulation of commanded joints lacks, from commands and angles",
+    DiagnoseDrives, "diagnose_drives", 13, "names the physics that the simulation of commanded joints lacks, from commands and angles",
         DiagnoseDrivesReads {} -> DiagnoseDrivesWrites {
             verdict: DriveVerdict,
             sentences: VerdictSentences,

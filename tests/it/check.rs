@@ -86,6 +86,33 @@ fn faults_of_the_yaml_and_of_the_robot_file_are_told_in_one_pass() {
 }
 
 #[test]
+fn currents_of_an_arm_without_motor_constants_are_warned_of() {
+    let pipeline = "calib: 1
+name: currents
+stages:
+  - uses: robot
+    with: {file: robot.yaml}
+  - uses: ingest_torques
+    with:
+      files:
+        - file: arm.csv
+          columns:
+            time: {column: t, unit: s}
+            q: {column: \"q{j}\", unit: deg}
+            current: {column: \"i{j}\", unit: A}
+";
+    let (code, out, err) = checked(ROBOT, pipeline, "t,q1,q2,i1,i2\n0,1,2,3,4\n", POINTS);
+    assert_eq!(code, 0, "{err}");
+    has(
+        &out,
+        [
+            "joint 1, 2 has no reduction ratio or no motor constant",
+            "ready",
+        ],
+    );
+}
+
+#[test]
 fn columns_that_are_not_there_are_named_with_the_nearest_all_at_once() {
     let (code, _, err) = checked(ROBOT, PIPELINE, "id,q1,q_2\n", "ids,x,y,z_mm\n");
     assert_eq!(code, 10, "{err}");

@@ -132,6 +132,11 @@ impl Drives {
                 .key
                 .apply(&accepted.numbers, &self.usual, self.duration, &mut physics);
         }
+        // Each number has this limit by itself; two causes at their limits, of an arm and of a joint, would pass it together.
+        for joint in &mut physics.joints {
+            joint.delay = joint.delay.max(0.0);
+            joint.damping = joint.damping.max(-joint.kd);
+        }
         physics
     }
 

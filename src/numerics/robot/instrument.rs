@@ -14,7 +14,8 @@ use nalgebra::Vector3;
 pub struct Instrument {
     /// Constant part of the stated figure, um.
     pub constant_um: f64,
-    /// Part that grows with range, um per metre.
+    /// Part that grows with range, um per metre; none where it is not stated.
+    #[serde(default)]
     pub per_metre_um: f64,
     /// How many sigmas the stated figures are; the divisor.
     pub coverage: f64,

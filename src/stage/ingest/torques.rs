@@ -15,7 +15,7 @@ use crate::ingest::stretch::Stretches;
 use crate::ingest::turns::TurnCounter;
 use crate::ingest::{check, reading};
 use crate::table::{ArmMotion, Intake, IntakeRow, Rejected, Robot, RobotRow, Table};
-use crate::{Context, RawFile, Sink, Stage, StreamedTable};
+use crate::{Context, RawFile, Sink, Stage, StreamedTable, torque_per_ampere};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -109,6 +109,13 @@ impl Stage for IngestTorques {
         context: &Context,
     ) -> Result<Option<IngestTorquesWrites>> {
         let robot = reads.map(|reads| reads.robot);
+        let in_current = |file: &FileLayout| file.has("current") && !file.has("torque");
+        if let Some(robot) = &robot
+            && self.files.iter().any(in_current)
+            && let Err(missing) = torque_per_ampere(&robot.to_description()?)
+        {
+            context.warn(missing.to_string());
+        }
         reading::headers(self.files.iter(), robot.as_ref(), self.limits, context).map(|()| None)
     }
 

@@ -110,10 +110,7 @@ fn an_instrument_is_named_or_given_in_numbers() {
 fn recorded_standard_deviations_replace_the_instrument_row_by_row() {
     let columns = "sigma_x: {column: u, unit: mm, optional: true}\n      sigma_y: {column: u, unit: mm, optional: true}\n      \
                    sigma_z: {column: v, unit: mm, optional: true}";
-    let (recording, _) = taken(
-        columns,
-        "instrument: {constant_um: 10, per_metre_um: 0, coverage: 1}",
-    );
+    let (recording, _) = taken(columns, "instrument: {constant_um: 10, coverage: 1}");
     is_near(
         &sigmas_um(&recording),
         &[[60.0, 60.0, 80.0], [10.0; 3], [10.0; 3]],

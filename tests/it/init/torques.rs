@@ -331,7 +331,10 @@ fn what_a_controller_expects_is_no_measurement_where_currents_are() {
     ]);
     made.has(&["simulated: {columns: [\"target_moment_0\""]);
     made.says(&["what the controller's own model expects"]);
-    made.lacks(&["      torque: {columns: [\"target_moment_0\""]);
+    made.lacks(&[
+        "      torque: {columns: [\"target_moment_0\"",
+        "are these degrees?",
+    ]);
 }
 
 #[test]
