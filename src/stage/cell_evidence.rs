@@ -81,7 +81,7 @@ impl Stage for CellEvidence {
 }
 
 crate::stage! {
-    TorqueEvidence, "torque_evidence", 12, "says what every possible cause explains of the torques of one robot",
+    TorqueEvidence, "torque_evidence", 11, "says what every possible cause explains of the torques of one robot",
         DiagnoseTorquesReads -> CellEvidenceWrites
 }
 

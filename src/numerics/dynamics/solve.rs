@@ -16,7 +16,7 @@ use super::refine::{
 use super::search::{faint, from_common, priors, search};
 use super::sweep::SweptColumns;
 use super::types::{ContactEvent, TorqueQuestion};
-use super::weighted::{NoiseMemory, WeightedColumns};
+use super::weighted::{JointNoise, NoiseMemory, WeightedColumns};
 use crate::criteria::torque::{BLOCKS, CONFIRMED, NAMED};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -32,6 +32,8 @@ const CLOCK_ROUNDS: usize = 4;
 pub(super) struct SolvedTorques<'a> {
     pub(crate) problem: TorqueProblem<'a>,
     pub(crate) weighted: WeightedColumns,
+    /// Noise that a rich model leaves.
+    rich: Vec<JointNoise>,
     /// Forms of the model.
     pub(crate) set: Vec<usize>,
     /// Those of them that are too little to be named.
@@ -39,6 +41,16 @@ pub(super) struct SolvedTorques<'a> {
     /// Slopes of the set.
     pub(crate) slopes: ShapeSlopes,
     pub(crate) latency: Option<Latency>,
+}
+
+impl SolvedTorques<'_> {
+    /// Weighs what may still join: what the causes leave holds that, too, so that it would count as noise.
+    pub(super) fn weigh_by_rich(&mut self) {
+        self.problem.noise.clone_from(&self.rich);
+        self.weighted = self.problem.weighted(&self.set);
+        let priors = priors(&CauseChoice::new(&self.problem, &self.weighted), &self.set);
+        self.weighted.know(&priors);
+    }
 }
 
 /// Looks for causes.
@@ -106,7 +118,8 @@ pub(super) fn solve<'a>(
     polish(&mut problem, &mut weighted, &mut set);
     let mut silent = set[named..].to_vec();
     // Of this noise are the numbers that are stated, too.
-    problem.noise = noise_left(&problem, &set);
+    let left = noise_left(&problem, &set);
+    let rich = std::mem::replace(&mut problem.noise, left);
     weighted = problem.weighted(&set);
     silent.extend(faint(&CauseChoice::new(&problem, &weighted), &set, &silent));
     let small = too_small(&mut problem, &weighted, &set, &silent);
@@ -117,6 +130,7 @@ pub(super) fn solve<'a>(
     SolvedTorques {
         problem,
         weighted,
+        rich,
         set,
         silent,
         slopes,
