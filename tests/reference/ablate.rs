@@ -5,7 +5,11 @@
 //! Recordings FIRST to FIRST + COUNT of the seed, in three worlds by turns: one cause of the list, the same with that cause taken out of the
 //! list, and physics of no list; POINTS to fit, 0 for 50 to 400. Only what a recording came by is scaled; `-` for no criterion.
 
-#![allow(clippy::print_stdout, reason = "a program of its own")]
+#![allow(
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "a program of its own"
+)]
 
 use calib_diagnose::{Diagnosis, Question, VerdictKind, diagnose, wrong_setup};
 use calib_numerics::criteria::{CriterionFactor, reached, scale};
