@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 pub(super) fn answers(solved: &mut SolvedTorques, given: &[GivenCell]) -> Vec<CellAnswer> {
     // What the rows of one robot do not confirm, those of all may.
     solved.problem.barred.clear();
-    solved.weigh_by_rich();
+    solved.weigh_by_rich_noise();
     let choice = CauseChoice::new(&solved.problem, &solved.weighted);
     let mut table = TorqueTable::new(&choice);
     let components = table.components(&solved.set);

@@ -33,7 +33,7 @@ pub(super) struct SolvedTorques<'a> {
     pub(crate) problem: TorqueProblem<'a>,
     pub(crate) weighted: WeightedColumns,
     /// Noise that a rich model leaves.
-    rich: Vec<JointNoise>,
+    rich_noise: Vec<JointNoise>,
     /// Forms of the model.
     pub(crate) set: Vec<usize>,
     /// Those of them that are too little to be named.
@@ -44,9 +44,10 @@ pub(super) struct SolvedTorques<'a> {
 }
 
 impl SolvedTorques<'_> {
-    /// Weighs what may still join: what the causes leave holds that, too, so that it would count as noise.
-    pub(super) fn weigh_by_rich(&mut self) {
-        self.problem.noise.clone_from(&self.rich);
+    /// Weighs by the noise that a rich model leaves, as fits what may still join: what the causes leave holds that, too, and it would count
+    /// as noise.
+    pub(super) fn weigh_by_rich_noise(&mut self) {
+        self.problem.noise.clone_from(&self.rich_noise);
         self.weighted = self.problem.weighted(&self.set);
         let priors = priors(&CauseChoice::new(&self.problem, &self.weighted), &self.set);
         self.weighted.know(&priors);
@@ -119,7 +120,7 @@ pub(super) fn solve<'a>(
     let mut silent = set[named..].to_vec();
     // Of this noise are the numbers that are stated, too.
     let left = noise_left(&problem, &set);
-    let rich = std::mem::replace(&mut problem.noise, left);
+    let rich_noise = std::mem::replace(&mut problem.noise, left);
     weighted = problem.weighted(&set);
     silent.extend(faint(&CauseChoice::new(&problem, &weighted), &set, &silent));
     let small = too_small(&mut problem, &weighted, &set, &silent);
@@ -130,7 +131,7 @@ pub(super) fn solve<'a>(
     SolvedTorques {
         problem,
         weighted,
-        rich,
+        rich_noise,
         set,
         silent,
         slopes,
